@@ -1,7 +1,8 @@
-//! Robot trait: pose, drives, looks, grasps, and their predicted cost. The parts of a body are in
-//! [`parts`](crate::parts).
+//! The [`Robot`] trait (pose, drives, turns of the head, frames, grasps and their predicted cost), and the
+//! types of its requests and answers. The parts of a body are in [`parts`](crate::parts).
 //!
-//! Frames: `map` (the room; z up where [`Description::up`] says so), `base` (x forward), `camera` (optical: x right, y down, z forward).
+//! Frames: `map` (the room; z up where [`Description::up`] says so), `base` (x forward), `camera` (optical: x
+//! right, y down, z forward).
 
 mod place;
 
@@ -16,7 +17,7 @@ pub use place::{Place, Pose2, Station};
 use serde::{Deserialize, Serialize};
 pub use tokio_util::sync::CancellationToken;
 
-/// Nanoseconds on the body's clock.
+/// Time stamp, nanoseconds on the body's clock.
 pub type Stamp = i64;
 
 /// A support surface in the map.
@@ -42,7 +43,7 @@ pub struct Room {
     pub outline_m: Vec<Point2<f64>>,
 }
 
-/// A door in the map; its state is only known on the spot.
+/// A door in the map, which does not say whether the door is open or shut.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Door {
     /// Name for people: `kitchen door`.
@@ -53,27 +54,28 @@ pub struct Door {
     pub along_rad: f64,
     /// Width of the opening, metres.
     pub width_m: f64,
-    /// Rooms on either side.
+    /// Names of the rooms on either side of the door.
     pub between: [String; 2],
 }
 
-/// Stated pose of the body.
+/// Pose of the body as estimated by its localisation, with the uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseEstimate {
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
-    /// Stated pose of the base.
+    /// Estimated pose of the base in the map.
     pub map_from_base: Isometry3<f64>,
-    /// Standard deviation along each axis, metres.
+    /// Standard deviation of the position along each axis, metres.
     pub sigma_m: f64,
-    /// Standard deviation about each axis, radians.
+    /// Standard deviation of the orientation about each axis, radians.
     pub sigma_rad: f64,
     /// Name of the current station, if the body has stations.
     pub station: Option<String>,
 }
 
 impl PoseEstimate {
-    /// The estimate as a place to drive from or to.
+    /// Returns the place where the body is: its current station, or else the estimated pose projected onto
+    /// the floor.
     pub fn place(&self) -> Place {
         match &self.station {
             Some(name) => Place::Station(name.clone()),
@@ -87,27 +89,27 @@ impl PoseEstimate {
 pub struct Travel {
     /// Length of the route, metres.
     pub distance_m: f64,
-    /// Σ max(ds/v, dθ/ω) along the route, seconds.
+    /// Duration of the drive, seconds: Σ max(ds/v, dθ/ω) along the route.
     pub duration_s: f64,
 }
 
-/// A drive that arrived.
+/// Result of a completed drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Driven {
     /// Distance by odometry, metres.
     pub distance_m: f64,
     /// Duration on the body's clock, seconds.
     pub duration_s: f64,
-    /// Stated pose of the base after the drive.
+    /// Estimated pose of the base after the drive, in the map.
     pub map_from_base: Isometry3<f64>,
 }
 
-/// A completed turn of the head.
+/// Result of a completed turn of the head.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Looked {
     /// Duration on the body's clock, seconds.
     pub duration_s: f64,
-    /// Angle between the line of sight and the requested point, radians; positive where the head's limits
+    /// Angle between the camera's axis and the requested point, radians; above zero where the head's limits
     /// ended the turn.
     pub miss_rad: f64,
 }
@@ -115,13 +117,13 @@ pub struct Looked {
 /// Transform between two frames at one time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StampedTransform {
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
     /// Frame that `parent_from_child` maps to.
     pub parent: String,
     /// Frame that `parent_from_child` maps from.
     pub child: String,
-    /// The transform.
+    /// Transform from the child frame to the parent frame.
     pub parent_from_child: Isometry3<f64>,
 }
 
@@ -130,26 +132,26 @@ pub struct StampedTransform {
 pub struct Colour {
     /// The pixels.
     pub image: RgbImage,
-    /// True if the colour pixels coincide with those of the depth image.
+    /// True if each colour pixel shows the same point as the depth pixel of the same column and row.
     pub registered: bool,
 }
 
-/// A camera frame with its transforms.
+/// One frame of the camera: depth, perhaps colour, and the transforms at its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensed {
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
-    /// Organised, in the optical frame, metres; NaN is "no return".
+    /// Point of each pixel, row by row, optical frame, metres; NaN where the camera got no return.
     pub cloud: Cloud,
-    /// Depth along z, metres, row by row; NaN is "no return".
+    /// Depth of each pixel along the optical axis, row by row, metres; NaN where the camera got no return.
     pub depth_m: Vec<f32>,
     /// Colour image, if the camera has colour.
     pub colour: Option<Colour>,
-    /// The camera.
+    /// Intrinsics of the camera.
     pub intrinsics: Intrinsics,
-    /// The chain map -> base -> camera at that time, as estimated by the body.
+    /// Transforms of the chain map -> base -> camera at the frame's time, as estimated by the body.
     pub transforms: Vec<StampedTransform>,
-    /// Product of the chain.
+    /// Pose of the camera in the map: the product of `transforms`.
     pub map_from_camera: Isometry3<f64>,
     /// Standard deviation of the camera position along each axis, metres.
     pub pose_sigma_m: f64,
@@ -171,14 +173,14 @@ impl Sensed {
     }
 }
 
-/// A laser sweep with its transforms.
+/// A laser sweep with the transforms at its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scanned {
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
     /// The readings, with the estimated pose of the laser.
     pub scan: Scan,
-    /// The chain map -> base -> laser at that time, as estimated by the body.
+    /// Transforms of the chain map -> base -> laser at the time of the sweep, as estimated by the body.
     pub transforms: Vec<StampedTransform>,
     /// Standard deviation of the laser position along each axis, metres.
     pub pose_sigma_m: f64,
@@ -186,27 +188,27 @@ pub struct Scanned {
     pub pose_sigma_rad: f64,
 }
 
-/// Reading of a custom sensor.
+/// A reading of a custom sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
-    /// Any JSON value; [`Sense::about`](crate::Sense::about) describes it.
+    /// Measured value, any JSON; [`Sense::about`](crate::Sense::about) says what it means.
     pub said: serde_json::Value,
 }
 
-/// A push against one object, which uncovers what is behind it.
+/// Request to push one object aside, so that the camera can see what is behind the object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Push {
     /// Centre of the object, map frame, metres.
     pub object: Point3<f64>,
-    /// Direction in the map frame, of any length.
+    /// Direction of the push in the map's x-y plane, a vector of any length above zero.
     pub direction: Vector2<f64>,
     /// Length of the push, metres.
     pub distance_m: f64,
 }
 
-/// A completed push.
+/// Result of a completed push.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pushed {
     /// Distance that the hand moved in contact with the object, metres.
@@ -215,16 +217,16 @@ pub struct Pushed {
     pub duration_s: f64,
 }
 
-/// A grasp of one free-standing object.
+/// Request to grasp one free-standing object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grasp {
     /// Centre of the object's body, map frame, metres.
     pub object: Point3<f64>,
-    /// Required opening of the hand, metres.
+    /// Opening of the hand that the object requires, metres.
     pub width_m: f64,
 }
 
-/// A completed grasp, with the object lifted.
+/// Result of a completed grasp: the object is lifted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grasped {
     /// Opening of the hand around the object, metres.
@@ -233,14 +235,14 @@ pub struct Grasped {
     pub duration_s: f64,
 }
 
-/// A placement of the held object.
+/// Request to put down the held object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placing {
-    /// Position of the object's base, map frame, metres.
+    /// Target position of the centre of the object's base, map frame, metres.
     pub foot: Point3<f64>,
 }
 
-/// A completed placement.
+/// Result of a completed placement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placed {
     /// Duration on the body's clock, seconds.
@@ -254,7 +256,7 @@ pub struct Hand {
     pub holds: bool,
 }
 
-/// A completed opening of a door.
+/// Result of a completed opening of a door.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Opened {
     /// Duration on the body's clock, seconds.
@@ -292,23 +294,25 @@ impl Default for Watch<'_> {
     }
 }
 
-/// A body: simulated, recorded or real. Every implementation must pass `conformance::check`.
+/// A robot body: simulated, recorded or real. Every implementation must pass `conformance::check`.
 ///
-/// Requests that take time are `async`, can be cancelled and have a limit; queries are neither. After a
-/// failure the body stands still and accepts further requests, unless it reported [`Failure::Broken`].
+/// Only requests that take time are `async`; they can be cancelled and have a time limit. After a failure the
+/// body stands still and accepts further requests, unless it reported [`Failure::Broken`].
 #[async_trait::async_trait]
 pub trait Robot: Send + Sync {
     /// Parts and abilities of the body.
     fn description(&self) -> &Description;
 
-    /// The body's clock. Simulated and recorded time advances by driving, looking and sensing, not by waiting.
+    /// Time on the body's clock. Simulated and recorded time advances by driving, looking and sensing, not by
+    /// waiting.
     fn now_ns(&self) -> Stamp;
 
-    /// The map of the room; `None` for a body without a map, such as a recording.
+    /// Occupancy grid of the floor; `None` for a body without a map, such as a recording.
     fn map(&self) -> Option<&OccupancyGrid>;
 
-    /// True for a simulation or a recording in this process: reopened, it starts in the same state and
-    /// answers the same requests identically. Any other body stays where it is, and no request is repeated.
+    /// True if the body, opened again, starts in the same state and answers the same requests identically, as
+    /// a simulation or a recording in this process does. False if it stays where it is; its requests are
+    /// never repeated.
     fn begins_again(&self) -> bool {
         false
     }
@@ -329,8 +333,8 @@ pub trait Robot: Send + Sync {
         &[]
     }
 
-    /// Predicts the drives from one place to each of the others on the map, without moving. All doors count
-    /// as open except those named in `shut`.
+    /// Predicts the cost of driving from one place to each of the others on the map, without moving. All
+    /// doors count as open except those named in `shut`.
     ///
     /// # Errors
     /// Separately for each entry: [`Failure::Unreachable`] with the reason.
@@ -348,22 +352,22 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Camera))
     }
 
-    /// Stated pose of the base.
+    /// Returns the estimated pose of the base.
     ///
     /// # Errors
     /// [`Failure::Lost`], [`Failure::Broken`].
     async fn pose(&self) -> Result<PoseEstimate, Failure>;
 
-    /// Drives to a place along a route on the map. A body without [`Description::base`] cannot move: any
-    /// other place is unreachable.
+    /// Drives to a place along a route on the map. For a body without [`Description::base`], every place but
+    /// the current one is unreachable.
     ///
     /// # Errors
     /// [`Failure::Unreachable`], [`Failure::Blocked`], [`Failure::TimedOut`], [`Failure::Cancelled`],
     /// [`Failure::Lost`], [`Failure::Broken`].
     async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure>;
 
-    /// Turns the head towards a point in the map, as far as its limits allow. A body without a head
-    /// reports the angle by which it misses.
+    /// Turns the head towards a point in the map, as far as its limits allow. A body without a head does not
+    /// move and reports the angle between its camera's axis and the point.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] if a coordinate is no number;
@@ -373,7 +377,7 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Camera))
     }
 
-    /// Takes one frame.
+    /// Takes one frame with the camera.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::SensorDropped`], [`Failure::TimedOut`],

@@ -37,15 +37,15 @@ pub enum Failure {
     /// A frame or sweep failed to arrive.
     #[error("no frame: {because}")]
     SensorDropped {
-        /// Missing frame.
+        /// Missing frame or sweep.
         because: String,
-        /// Due time, on the body's clock.
+        /// Time at which the frame or sweep was due, nanoseconds on the body's clock.
         stamp_ns: Stamp,
     },
     /// The body does not know where it is.
     #[error("lost: {because}")]
     Lost {
-        /// Sign of the lost localisation.
+        /// Evidence that localisation is lost.
         because: String,
     },
     /// The hand failed; the scene may have changed nevertheless.
@@ -56,22 +56,23 @@ pub enum Failure {
         /// Distance that the hand moved in contact with the object, metres.
         moved_m: f64,
     },
-    /// This body lacks the ability (see [`Description`](crate::Description)).
+    /// The body cannot do this: a part is missing (see [`Description`](crate::Description)), or the hand is
+    /// full or empty.
     #[error("not able to: {because}")]
     Unable {
-        /// Missing part.
+        /// Missing part or ability, or the state of the hand.
         because: String,
     },
     /// The body has failed permanently; no further request is possible.
     #[error("broken: {because}")]
     Broken {
-        /// Broken part.
+        /// Cause of the failure.
         because: String,
     },
 }
 
 impl Failure {
-    /// The sentence behind the kind.
+    /// Reason for the failure, one plain sentence.
     pub fn because(&self) -> &str {
         match self {
             Failure::Unreachable { because }
@@ -101,7 +102,7 @@ impl Failure {
         }
     }
 
-    /// True if a retry may succeed.
+    /// True for failures that may pass by themselves, so that a retry may succeed.
     pub fn is_passing(&self) -> bool {
         matches!(
             self,

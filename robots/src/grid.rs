@@ -19,7 +19,8 @@ pub struct OccupancyGrid {
 }
 
 impl OccupancyGrid {
-    /// The smallest grid of cells that covers the box between two corners; all of it free.
+    /// Creates the smallest grid that covers the rectangle between two corners (map frame, metres), with all
+    /// cells free.
     pub fn covering(low: Point2<f64>, high: Point2<f64>, resolution_m: f64) -> Self {
         let cells = |from: f64, to: f64| (((to - from) / resolution_m).ceil() as usize).max(1);
         let (width, height) = (cells(low.x, high.x), cells(low.y, high.y));
@@ -47,12 +48,13 @@ impl OccupancyGrid {
         self.cell(p).is_none_or(|(c, r)| self.occupied[r * self.width + c])
     }
 
-    /// Marks the cells whose centres satisfy `inside`.
+    /// Marks as occupied the cells whose centres satisfy `inside`.
     pub fn occupy(&mut self, inside: impl Fn(&Point2<f64>) -> bool) {
         self.occupy_in([(0, self.width), (0, self.height)], inside);
     }
 
-    /// Marks the cells whose centres satisfy `inside`, all of which lie within `reach_m` of `middle`.
+    /// Marks as occupied the cells whose centres satisfy `inside`, which must be false for points farther
+    /// than `reach_m` from `middle`.
     pub fn occupy_near(&mut self, middle: &Point2<f64>, reach_m: f64, inside: impl Fn(&Point2<f64>) -> bool) {
         let span = |k: usize, size: usize| {
             let at = |p: f64| ((p - self.origin_m[k]) / self.resolution_m).clamp(0.0, size as f64);

@@ -6,14 +6,14 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 /// Direction of the head, in the base frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gaze {
-    /// Pan angle, counter-clockwise from the base's x.
+    /// Pan angle, counter-clockwise from the base's x, radians.
     pub pan_rad: f64,
-    /// Tilt angle, downwards from horizontal.
+    /// Tilt angle, downwards from horizontal, radians.
     pub tilt_rad: f64,
 }
 
-/// The gaze towards a point in the base frame, within the head's limits, and the remaining angle between line
-/// of sight and point, radians.
+/// Returns the gaze towards a point in the base frame, within the head's limits, and the remaining angle
+/// between the line of sight and the point, radians.
 pub fn aim(head: &Head, base_point: &Point3<f64>) -> (Gaze, f64) {
     let line = base_point - head.base_from_head;
     if line.norm() < 1e-9 {
@@ -28,13 +28,13 @@ pub fn aim(head: &Head, base_point: &Point3<f64>) -> (Gaze, f64) {
     (gaze, miss_rad)
 }
 
-/// Direction of the line of sight in the base frame.
+/// Direction of the line of sight, a unit vector in the base frame.
 fn sight(gaze: &Gaze) -> Vector3<f64> {
     let level = gaze.tilt_rad.cos();
     Vector3::new(level * gaze.pan_rad.cos(), level * gaze.pan_rad.sin(), -gaze.tilt_rad.sin())
 }
 
-/// The camera's optical frame (x right, y down, z forward) in the base frame.
+/// Pose of the camera's optical frame (x right, y down, z forward) in the base frame.
 pub fn base_from_camera(head: &Head, gaze: &Gaze) -> Isometry3<f64> {
     let forward = sight(gaze);
     let right = Vector3::new(gaze.pan_rad.sin(), -gaze.pan_rad.cos(), 0.0);
@@ -46,8 +46,8 @@ pub fn base_from_camera(head: &Head, gaze: &Gaze) -> Isometry3<f64> {
     )
 }
 
-/// `map_from_camera` for a base at `map_from_base` with the head turned towards a point in the map; straight
-/// ahead and horizontal if `None`.
+/// Pose of the camera in the map, with the base at `map_from_base` and the head turned towards `look_at`, a
+/// point in the map; straight ahead and horizontal if `None`.
 pub fn camera_towards(
     head: &Head,
     map_from_base: &Isometry3<f64>,

@@ -8,7 +8,7 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-/// Fault in a file, drawn under its text.
+/// Error in a file, displayed with the affected line and a mark below the place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", self.drawn())]
 pub struct InputError {
@@ -22,14 +22,14 @@ pub struct InputError {
     pub excerpt: String,
     /// Column of the error within the excerpt, in characters, from 1.
     caret: usize,
-    /// Found and expected values.
+    /// Description of the error: what was found, and what was expected.
     pub problem: String,
     /// Suggested fix.
     pub mend: String,
 }
 
 impl InputError {
-    /// An error of the whole file.
+    /// Creates an error of the whole file.
     pub fn whole(file: impl Into<String>, problem: impl Into<String>, mend: impl Into<String>) -> Self {
         InputError {
             file: file.into(),
@@ -42,7 +42,7 @@ impl InputError {
         }
     }
 
-    /// An error at a byte offset of the text.
+    /// Creates an error at a byte offset of the text.
     pub fn at(
         file: &str,
         text: &str,
@@ -83,7 +83,7 @@ impl InputError {
 /// Maximum length of an excerpt, characters. From: chosen, twice the width of a terminal.
 const EXCERPT: usize = 240;
 
-/// Clips a line for an error, with a mark for the rest.
+/// Clips a line to `EXCERPT` characters, with `…` in place of the rest.
 pub fn clipped(line: &str) -> String {
     match line.char_indices().nth(EXCERPT) {
         Some((end, _)) => format!("{}…", &line[..end]),
@@ -91,7 +91,7 @@ pub fn clipped(line: &str) -> String {
     }
 }
 
-/// Maximum size of a text written by a person: a domain, a scene, settings, bytes. From: chosen.
+/// Maximum size, bytes, of a text written by a person: a domain, a scene, settings. From: chosen.
 pub const MOST_TEXT_BYTES: u64 = 16 << 20;
 
 /// Reads a file of at most `most` bytes. Named pipes, devices and sockets are refused without waiting for
@@ -116,10 +116,10 @@ pub fn read_bytes(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text file.
+/// Reads a text file of at most [`MOST_TEXT_BYTES`].
 ///
 /// # Errors
-/// As [`read_bytes`], and if it is not UTF-8.
+/// Those of [`read_bytes`], and an error if the content is not UTF-8.
 pub fn read_text(path: &Path) -> std::io::Result<String> {
     String::from_utf8(read_bytes(path, MOST_TEXT_BYTES)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
@@ -127,7 +127,7 @@ pub fn read_text(path: &Path) -> std::io::Result<String> {
     })
 }
 
-/// Description of a file type other than a regular file.
+/// Name for people of a file type other than a regular file.
 pub fn kind_of(file_type: FileType) -> &'static str {
     match file_type {
         kind if kind.is_dir() => "a folder",
@@ -138,27 +138,27 @@ pub fn kind_of(file_type: FileType) -> &'static str {
     }
 }
 
-/// One step into a TOML document.
+/// One step of a path into a TOML document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Into a table.
+    /// Into a table, by key.
     Key(&'static str),
-    /// Into an array.
+    /// Into an array, by index from 0.
     Index(usize),
 }
 
 /// An invalid value in a well-formed document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Objection {
-    /// Path in the document.
+    /// Path of the value in the document.
     pub path: Vec<Step>,
-    /// Found and expected values.
+    /// Description of the error: what was found, and what was expected.
     pub problem: String,
     /// Suggested fix.
     pub mend: String,
 }
 
-/// Parses TOML; syntax errors are drawn under the text.
+/// Parses TOML; a syntax error is displayed with its line.
 pub fn parse_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         let byte = e.span().map_or(0, |s| s.start);
@@ -167,7 +167,7 @@ pub fn parse_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Inpu
     })
 }
 
-/// Error of the TOML parser in words for people, and its mend, if the error itself says none.
+/// Message for people about an error of the TOML parser, and a suggested fix, if one is known for that error.
 pub fn toml_problem(error: &toml::de::Error) -> (String, Option<&'static str>) {
     const TYPES: [(&str, &str); 4] = [
         ("f64", "a number"),
@@ -192,7 +192,7 @@ fn mend_of(problem: &str) -> Option<&'static str> {
     mends.iter().find(|(word, _)| problem.contains(word)).map(|(_, mend)| *mend)
 }
 
-/// Draws an objection under the deepest part of its path that exists in the text.
+/// Converts an objection to an error at the deepest part of its path that exists in the text.
 pub fn draw(file: &str, text: &str, objection: Objection) -> InputError {
     let span = span_of(text, &objection.path).unwrap_or(0..0);
     InputError::at(file, text, span.start, objection.problem, objection.mend)

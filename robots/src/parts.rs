@@ -11,43 +11,43 @@ use serde::{Deserialize, Serialize};
 pub struct Description {
     /// Name, for people and records.
     pub name: String,
-    /// True if the world is simulated too.
+    /// True if the body and its world are simulated.
     pub simulated: bool,
     /// Base; `None` if the body stays at its only station.
     pub base: Option<Base>,
     /// Head that turns the camera; `None` if the camera's direction follows the base's pose.
     pub head: Option<Head>,
-    /// Arm that pushes and opens doors.
+    /// Arm; `None` if the body has none.
     pub arm: Option<Arm>,
-    /// The depth camera.
+    /// Depth camera; `None` if the body has none.
     pub camera: Option<Camera>,
-    /// The laser.
+    /// Planar laser; `None` if the body has none.
     pub laser: Option<Laser>,
-    /// Other sensors, whose readings the programs of a domain interpret.
+    /// Other sensors, whose readings are interpreted by programs of a domain.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub senses: Vec<Sense>,
-    /// Names of the frames without a sensor.
+    /// Names of the coordinate frames of the room and of the body.
     pub frames: Frames,
     /// Upward direction in the map frame, if known.
     pub up: Option<Vector3<f64>>,
-    /// Standard deviation of localisation along each axis, metres.
+    /// Standard deviation of the estimated position along each axis, metres.
     pub pose_sigma_m: f64,
-    /// Standard deviation of the heading, radians.
+    /// Standard deviation of the estimated heading, radians.
     pub pose_sigma_rad: f64,
 }
 
 /// An optional part of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// [`Description::base`].
+    /// Mobile base: [`Description::base`].
     Base,
-    /// [`Description::arm`].
+    /// Arm: [`Description::arm`].
     Arm,
-    /// [`Arm::hand`].
+    /// Hand at the end of the arm: [`Arm::hand`].
     Hand,
-    /// [`Description::camera`].
+    /// Depth camera: [`Description::camera`].
     Camera,
-    /// [`Description::laser`].
+    /// Planar laser: [`Description::laser`].
     Laser,
 }
 
@@ -83,27 +83,27 @@ impl Description {
         if self.has(part) { Ok(()) } else { Err(self.lacks(part)) }
     }
 
-    /// Failure of a body that lacks the part.
+    /// Failure of a request that needs a part which the body lacks.
     pub(crate) fn lacks(&self, part: Part) -> Failure {
         Failure::Unable { because: format!("{} has no {part}", self.name) }
     }
 
-    /// Failure of a body that lacks a sense of that name.
+    /// Failure of a request to read a custom sensor, by name, which the body lacks.
     pub(crate) fn lacks_sense(&self, name: &str) -> Failure {
         Failure::Unable { because: format!("{} has no sense \"{name}\"", self.name) }
     }
 
-    /// The hand at the arm's end.
+    /// Hand at the end of the arm; `None` without an arm or a hand.
     pub fn hand(&self) -> Option<&Gripper> {
         self.arm.as_ref()?.hand.as_ref()
     }
 
-    /// Reach of the arm from the base's centre, metres.
+    /// Reach of the arm from the base's centre, metres; `None` without an arm.
     pub fn reach_m(&self) -> Option<f64> {
         self.arm.as_ref().map(|arm| arm.reach_m)
     }
 
-    /// Duration of a straight drive, seconds, as [`Speeds::duration_s`]; 0 without a base.
+    /// Duration of a straight drive with a turn, seconds, by [`Speeds::duration_s`]; 0 without a base.
     pub fn duration_s(&self, distance_m: f64, turned_rad: f64) -> f64 {
         self.base.as_ref().map_or(0.0, |base| base.speeds.duration_s(distance_m, turned_rad))
     }
@@ -123,18 +123,18 @@ pub struct Base {
     pub speeds: Speeds,
 }
 
-/// The outline of the base on the floor, in its own frame.
+/// Outline of the base on the floor, in the base frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Footprint {
-    /// A disc around the base's origin.
+    /// Disc around the base's origin.
     Disc {
         /// Radius, metres.
         radius_m: f64,
     },
-    /// Corners in order, metres.
+    /// Polygon around the base's origin.
     Polygon {
-        /// The corners, at least three.
+        /// Corners in order, at least three, metres.
         corners_m: Vec<Point2<f64>>,
     },
 }
@@ -187,11 +187,11 @@ pub struct Head {
 pub struct Arm {
     /// Reach from the base's centre, metres.
     pub reach_m: f64,
-    /// Gripper at its end; `None` if it only pushes.
+    /// Hand at its end; `None` if the arm only pushes.
     pub hand: Option<Gripper>,
 }
 
-/// A hand.
+/// Hand that grasps objects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gripper {
     /// Maximum width of a graspable object, metres.
@@ -201,22 +201,22 @@ pub struct Gripper {
 /// A depth camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// Name of its optical frame: x right, y down, z forward.
+    /// Name of the camera's optical frame: x right, y down, z forward.
     pub frame: String,
-    /// Pixels, focal lengths and principal point.
+    /// Image size, focal lengths and principal point, pixels.
     pub intrinsics: Intrinsics,
     /// Minimum and maximum depth, metres.
     pub range_m: (f64, f64),
     /// True if frames may have a colour image.
     pub colour: bool,
-    /// Maximum time by which a frame's stamp may precede its request, seconds: drivers with a buffer return
-    /// an existing frame.
+    /// Maximum time by which a frame's stamp may precede its request, seconds. Drivers with a buffer may
+    /// return a frame from before the request.
     #[serde(default)]
     pub latency_s: f64,
 }
 
 impl Camera {
-    /// True if a point in its optical frame lies in its field of view and range.
+    /// True if a point in the camera's optical frame lies in the field of view and in range.
     pub fn shows(&self, p: &Point3<f64>) -> bool {
         if p.z <= 0.0 || p.z < self.range_m.0 || p.z > self.range_m.1 {
             return false;
@@ -230,36 +230,36 @@ impl Camera {
 /// A laser that sweeps in a horizontal plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Laser {
-    /// Name of its frame, x straight ahead.
+    /// Name of the laser's frame, whose x axis points straight ahead.
     pub frame: String,
-    /// Pose of the laser on the base; constant.
+    /// Constant pose of the laser in the base frame.
     pub base_from_laser: Isometry3<f64>,
     /// Angle of the first reading, anticlockwise from straight ahead, radians.
     pub first_rad: f64,
     /// Angle from one reading to the next, radians.
     pub step_rad: f64,
-    /// Readings in a sweep.
+    /// Number of readings in a sweep.
     pub readings: usize,
     /// Maximum range, metres.
     pub reach_m: f64,
 }
 
-/// A sensor other than camera and laser: a label reader, a microphone, a switch in the hand.
+/// A custom sensor, other than camera and laser: a label reader, a microphone, a switch in the hand.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sense {
     /// Name for people and domains: `label reader`.
     pub name: String,
-    /// One line on the meaning and form of its readings, stored with each reading in the record.
+    /// One line on the meaning and form of the readings, stored with each reading in the record.
     pub about: String,
 }
 
-/// Names of the frames without a sensor.
+/// Names of the coordinate frames of the room and of the body.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Frames {
-    /// The room.
+    /// Name of the map frame, fixed to the room.
     pub map: String,
-    /// The body.
+    /// Name of the base frame, fixed to the body.
     pub base: String,
 }
 

@@ -1,4 +1,4 @@
-//! Requests and answers as values, for tapes, programs and conformance.
+//! Requests to a body and its answers as values, for recording, replay, robot programs and conformance tests.
 
 use crate::body::{
     Colour, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate, Push, Pushed,
@@ -14,27 +14,27 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Request {
-    /// [`Robot::pose`].
+    /// Estimate the pose: [`Robot::pose`].
     Pose,
-    /// [`Robot::drive_to`].
+    /// Drive to a place: [`Robot::drive_to`].
     DriveTo(Place),
-    /// [`Robot::look_at`].
+    /// Turn the head towards a point in the map, metres: [`Robot::look_at`].
     LookAt(Point3<f64>),
-    /// [`Robot::sense`].
+    /// Take a frame with the camera: [`Robot::sense`].
     Sense,
-    /// [`Robot::scan`].
+    /// Take a laser sweep: [`Robot::scan`].
     Scan,
-    /// [`Robot::read`].
+    /// Read the custom sensor of this name: [`Robot::read`].
     Read(String),
-    /// [`Robot::push_aside`].
+    /// Push an object aside: [`Robot::push_aside`].
     PushAside(Push),
-    /// [`Robot::open_door`].
+    /// Open the door of this name: [`Robot::open_door`].
     OpenDoor(String),
-    /// [`Robot::grasp`].
+    /// Grasp an object: [`Robot::grasp`].
     Grasp(Grasp),
-    /// [`Robot::place`].
+    /// Put down the held object: [`Robot::place`].
     Place(Placing),
-    /// [`Robot::hand`].
+    /// Report the state of the hand: [`Robot::hand`].
     Hand,
 }
 
@@ -56,8 +56,8 @@ impl Request {
         }
     }
 
-    /// The optional part that the request needs, if any. (A drive to the current place needs no base, a door
-    /// may open itself, and custom sensors are checked by name.)
+    /// Part without which the request fails; `None` if it depends on the case. (A drive to the current place
+    /// needs no base, a door may open itself, and custom sensors are checked by name.)
     pub fn needs(&self) -> Option<Part> {
         match self {
             Request::Pose | Request::DriveTo(_) | Request::Read(_) | Request::OpenDoor(_) => None,
@@ -68,7 +68,8 @@ impl Request {
         }
     }
 
-    /// Sends the request to a body. The pixels of a frame are returned separately.
+    /// Sends the request to a body; returns the answer, and for a camera frame also the frame with its
+    /// pixels.
     pub async fn ask(&self, body: &dyn Robot, watch: &Watch<'_>) -> (Answer, Option<Sensed>) {
         let answer = match self {
             Request::Pose => body.pose().await.map(Answer::Pose),
@@ -108,55 +109,55 @@ impl std::fmt::Display for Request {
     }
 }
 
-/// Answer of the body.
+/// Answer of a body to a [`Request`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
-    /// To [`Request::Pose`].
+    /// Estimated pose, for [`Request::Pose`].
     Pose(PoseEstimate),
-    /// To [`Request::DriveTo`].
+    /// Completed drive, for [`Request::DriveTo`].
     Driven(Driven),
-    /// To [`Request::LookAt`].
+    /// Completed turn of the head, for [`Request::LookAt`].
     Looked(Looked),
-    /// To [`Request::Sense`].
+    /// Camera frame without its pixels, for [`Request::Sense`].
     Sensed(Exposure),
-    /// To [`Request::Scan`].
+    /// Laser sweep, for [`Request::Scan`].
     Scanned(Scanned),
-    /// To [`Request::Read`].
+    /// Reading of a custom sensor, for [`Request::Read`].
     Read(Reading),
-    /// To [`Request::PushAside`].
+    /// Completed push, for [`Request::PushAside`].
     Pushed(Pushed),
-    /// To [`Request::OpenDoor`].
+    /// Completed opening of a door, for [`Request::OpenDoor`].
     Opened(Opened),
-    /// To [`Request::Grasp`].
+    /// Completed grasp, for [`Request::Grasp`].
     Grasped(Grasped),
-    /// To [`Request::Place`].
+    /// Completed placement, for [`Request::Place`].
     Placed(Placed),
-    /// To [`Request::Hand`].
+    /// State of the hand, for [`Request::Hand`].
     Hand(Hand),
-    /// The request failed.
+    /// Failure of any request.
     Failed(Failure),
 }
 
-/// A frame without its pixels, which are stored separately.
+/// A camera frame without its pixels, which are stored separately.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
-    /// See [`Sensed::stamp_ns`].
+    /// Time stamp, as [`Sensed::stamp_ns`], nanoseconds.
     pub stamp_ns: Stamp,
-    /// See [`Sensed::intrinsics`].
+    /// Intrinsics of the camera, as [`Sensed::intrinsics`].
     pub intrinsics: Intrinsics,
-    /// See [`Sensed::transforms`].
+    /// Transforms of the chain map -> base -> camera, as [`Sensed::transforms`].
     pub transforms: Vec<StampedTransform>,
-    /// See [`Sensed::map_from_camera`].
+    /// Pose of the camera in the map, as [`Sensed::map_from_camera`].
     pub map_from_camera: Isometry3<f64>,
-    /// See [`Sensed::pose_sigma_m`].
+    /// Standard deviation of the camera position, metres, as [`Sensed::pose_sigma_m`].
     pub pose_sigma_m: f64,
-    /// See [`Sensed::pose_sigma_rad`].
+    /// Standard deviation of the camera orientation, radians, as [`Sensed::pose_sigma_rad`].
     pub pose_sigma_rad: f64,
 }
 
 impl Answer {
-    /// Shifts the time stamps of the answer by `by_ns`.
+    /// Shifts the time stamps of the answer by `by_ns` nanoseconds.
     pub(crate) fn later(mut self, by_ns: Stamp) -> Self {
         match &mut self {
             Answer::Pose(pose) => pose.stamp_ns += by_ns,
@@ -175,7 +176,7 @@ impl Answer {
         self
     }
 
-    /// Stated pose of the base, if the answer has one.
+    /// Estimated pose of the base in the map, if the answer has one.
     pub(crate) fn place(&self) -> Option<&Isometry3<f64>> {
         match self {
             Answer::Pose(pose) => Some(&pose.map_from_base),
@@ -186,7 +187,7 @@ impl Answer {
 }
 
 impl Exposure {
-    /// Takes everything but the pixels from a frame.
+    /// Copies everything but the pixels from a frame.
     pub fn of(sensed: &Sensed) -> Self {
         Exposure {
             stamp_ns: sensed.stamp_ns,
@@ -214,10 +215,10 @@ impl Exposure {
     }
 }
 
-/// Measurements of the camera in a frame.
+/// Pixels of a camera frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pixels {
-    /// Organised, in the optical frame, metres; NaN is "no return".
+    /// Point of each pixel, row by row, optical frame, metres; NaN where the camera got no return.
     pub cloud: Cloud,
     /// Colour image, if the camera has colour.
     pub colour: Option<Colour>,

@@ -27,7 +27,7 @@ const MOST_ACCESSES: usize = 4096;
 /// Maximum number of pose pairs with cached routes; the cache is cleared beyond that.
 const MOST_WAYS: usize = 1 << 20;
 
-/// The bits of the coordinates and the heading of a pose.
+/// Bit patterns of x, y and heading of a pose, as a cache key.
 type PoseBits = [u64; 3];
 
 /// A route with its cost.
@@ -51,13 +51,14 @@ pub struct Router {
     corners: Vec<Point2<f64>>,
     seen: Vec<OnceLock<Vec<u32>>>,
     rows: Vec<OnceLock<Vec<Option<Leg>>>>,
-    /// Cached accesses by the bits of the coordinates.
+    /// Cached visible corners of each point, by the bit patterns of x and y.
     accesses: Mutex<BTreeMap<[u64; 2], Arc<Access>>>,
-    /// Cached costs between poses; none where there is no route.
+    /// Cached cost and course of the route between two poses; `None` where there is no route.
     ways: Mutex<HashMap<(PoseBits, PoseBits), Option<(Travel, Via)>>>,
 }
 
-/// The shortest route from one corner to another, reduced to what the search for a pair of poses needs.
+/// Shortest route from one corner to another: length, turning on the way, first and last heading, and the
+/// corner before the last.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
     distance_m: f64,
@@ -67,14 +68,14 @@ struct Leg {
     previous: u32,
 }
 
-/// Access of a pose to the corners: straight lines to the visible ones.
+/// Corners that are visible from a point: index, distance in metres and heading in radians of each.
 #[derive(Debug)]
 struct Access {
     point: Point2<f64>,
     corners: Vec<(u32, f64, f64)>,
 }
 
-/// Corners of a route.
+/// Course of a route: a straight line, or around corners, given by the indices of the first and the last.
 #[derive(Clone, Copy, Debug)]
 enum Via {
     Straight,
@@ -99,12 +100,12 @@ impl Router {
         }
     }
 
-    /// The map with every cell occupied that the centre of the base must not enter.
+    /// Inflated map, in which every cell is occupied that the centre of the base must not enter.
     pub fn blocked(&self) -> &OccupancyGrid {
         &self.blocked
     }
 
-    /// The original map.
+    /// Map before its inflation.
     pub fn map(&self) -> &OccupancyGrid {
         &self.map
     }
@@ -167,7 +168,7 @@ impl Router {
         poses.iter().map(|from| row(from, &self.start_access(from))).collect()
     }
 
-    /// The route with its waypoints.
+    /// Finds the quickest route between two poses, with its waypoints.
     ///
     /// # Errors
     /// [`Failure::Unreachable`] with the reason.
@@ -225,7 +226,7 @@ impl Router {
         Access { point, corners: (0u32..).zip(&self.corners).filter_map(line).collect() }
     }
 
-    /// Centre of the free cell nearest to a point within [`START_SLACK_M`].
+    /// Centre of the free cell nearest to a point; `None` if there is none within [`START_SLACK_M`].
     fn nearest_free(&self, p: &Point2<f64>) -> Option<Point2<f64>> {
         let reach = (START_SLACK_M / self.blocked.resolution_m).ceil() as i64;
         let (column, row) = self.blocked.cell(p)?;
@@ -246,7 +247,7 @@ impl Router {
         best.map(|(_, centre)| centre)
     }
 
-    /// The quickest route between two poses, cached.
+    /// Cost and course of the quickest route between two poses, cached.
     fn best(&self, from: &Pose2, start: &Access, to: &Pose2, end: &Access) -> Result<(Travel, Via), Failure> {
         let key = (bits(from), bits(to));
         let known = self.known_ways().get(&key).copied();
@@ -305,8 +306,9 @@ impl Router {
         self.best_bent(heading_rad, start, to.yaw_rad, end, total)
     }
 
-    /// The quickest route around corners; `total` is the cost of metres and radians, and ties go to the first
-    /// corners. Corners are tried in the order of a lower bound on their cost, until it exceeds the best.
+    /// Finds the quickest route around corners; `total` converts metres and radians to a cost. First corners
+    /// are tried in the order of a lower bound on the cost, until the bound exceeds the best; ties go to the
+    /// earlier one.
     fn best_bent(
         &self,
         heading_rad: f64,
@@ -364,7 +366,7 @@ impl Router {
         })
     }
 
-    /// Shortest routes from one corner to all others.
+    /// Shortest routes from one corner to all others, by corner; `None` for a corner that cannot be reached.
     fn row(&self, from: u32) -> &[Option<Leg>] {
         self.rows[from as usize].get_or_init(|| {
             let micrometres = |a: u32, b: u32| {
@@ -478,7 +480,7 @@ fn unreachable(because: String) -> Failure {
     Failure::Unreachable { because }
 }
 
-/// Absolute angle between two headings, 0 to π.
+/// Absolute angle between two headings, 0 to π radians.
 pub fn turn(from_rad: f64, to_rad: f64) -> f64 {
     let full = std::f64::consts::TAU;
     let d = (to_rad - from_rad).rem_euclid(full);
@@ -543,7 +545,8 @@ fn convex_corners(blocked: &OccupancyGrid) -> Vec<Point2<f64>> {
     corners
 }
 
-/// Centre of the occupied cell nearest to a point within `reach_m`, and the distance to its side, metres.
+/// Centre of the occupied cell nearest to a point, and the distance from the point to that cell, metres. Only
+/// cells up to about `reach_m` away are searched.
 fn nearest_occupied(map: &OccupancyGrid, p: &Point2<f64>, reach_m: f64) -> Option<(Point2<f64>, f64)> {
     let half_m = 0.5 * map.resolution_m;
     let cells = (reach_m / map.resolution_m).ceil() as usize + 1;

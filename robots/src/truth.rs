@@ -8,22 +8,22 @@ use std::path::Path;
 /// The true state of a scene at one time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
-    /// Pose of the base.
+    /// True pose of the base.
     pub base: Pose2,
     /// All objects, in the order of the scene file, then the obstacles missing in the map.
     pub objects: Vec<TrueObject>,
     /// All doors, in the order of the scene file.
     #[serde(default)]
     pub doors: Vec<TrueDoor>,
-    /// Name of the target of the arrangement.
+    /// Name of the object whose visibility the scene requires, if any.
     #[serde(default)]
     pub target: Option<String>,
-    /// Share of the target visible from the start.
+    /// Share of the target that is visible from the start, 0 to 1.
     #[serde(default)]
     pub target_visible_from_start: Option<f64>,
-    /// Faults and actions of others so far.
+    /// Events in the room so far: injected faults, actions of people, effects of the body.
     #[serde(default)]
     pub events: Vec<Event>,
 }
@@ -33,23 +33,23 @@ pub struct Truth {
 pub struct TrueObject {
     /// Unique in the scene.
     pub name: String,
-    /// Kind.
+    /// Kind of the object; several objects may be of one kind.
     pub kind: String,
-    /// Surface of the object; none in the hand, on the floor or taken away.
+    /// Name of the surface on which the object stands; `None` in the hand, on the floor or taken away.
     pub surface: Option<String>,
-    /// Room of the object, if the scene names rooms; none if taken away.
+    /// Name of the room of the object, if the scene names rooms; `None` if taken away.
     #[serde(default)]
     pub room: Option<String>,
-    /// True while it is held by the body.
+    /// True while the body holds the object.
     #[serde(default)]
     pub in_hand: bool,
-    /// False once it has been taken away.
+    /// False once the object has been taken away.
     pub present: bool,
-    /// Pose of its base, in the map.
+    /// Pose of the object in the map; the origin is the centre of its base.
     pub map_from_object: Isometry3<f64>,
-    /// Centre of its body without a handle, map frame, metres.
+    /// Centre of the object's body without a handle, map frame, metres.
     pub centre_m: Point3<f64>,
-    /// Size of its bounding box in its own frame, including a handle, metres.
+    /// Size of the bounding box in the object's own frame, including a handle, metres.
     pub size_m: [f64; 3],
 }
 
@@ -58,14 +58,14 @@ pub struct TrueObject {
 pub struct TrueDoor {
     /// Name for people.
     pub name: String,
-    /// True if it is shut.
+    /// True if the door is shut.
     pub shut: bool,
 }
 
 /// An event in the simulated room.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
     /// Description, in one sentence.
     pub what: String,

@@ -25,12 +25,12 @@ impl Pose2 {
         Pose2 { x_m, y_m, yaw_rad: (point.y - y_m).atan2(point.x - x_m) }
     }
 
-    /// Position in the map.
+    /// Position in the map, metres.
     pub fn point(&self) -> Point2<f64> {
         Point2::new(self.x_m, self.y_m)
     }
 
-    /// Pose in space: z is zero, upright.
+    /// Pose in space with z = 0 and the body upright.
     pub fn isometry(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(self.x_m, self.y_m, 0.0),
@@ -75,6 +75,6 @@ impl std::fmt::Display for Place {
 pub struct Station {
     /// Unique among the stations of the body.
     pub name: String,
-    /// Pose of the base there.
+    /// Pose of the base at the station, in the map.
     pub map_from_base: Isometry3<f64>,
 }

@@ -5,9 +5,9 @@ use crate::body::{CancellationToken, Place, Pose2, Robot, Watch};
 use crate::failure::Failure;
 use nalgebra::Vector2;
 
-/// Distance of the base from the middle of a door to open it, metres.
+/// Distance of the base from the middle of a door from which the test opens the door, metres.
 const BEFORE_M: f64 = 0.7;
-/// Maximum number of tries, as hands may slip.
+/// Maximum number of tries to open a door, since the hand may slip.
 const TRIES: usize = 8;
 
 pub(super) async fn check_doors(robot: &dyn Robot) -> Result<(), Breach> {

@@ -6,12 +6,12 @@ use crate::failure::Failure;
 use crate::parts::Gripper;
 use nalgebra::Point3;
 
-/// Maximum number of tries, as hands may slip.
+/// Maximum number of tries to grasp, since the hand may slip.
 const TRIES: usize = 8;
 /// Point without anything to grasp, in the base frame, metres.
 const THIN_AIR: [f64; 3] = [0.5, 0.0, 1.9];
 
-/// Checks the hand, which must be empty; it is empty again afterwards.
+/// Checks the hand, which must be empty at the start; it is empty again at the end.
 pub(super) async fn check_hand(robot: &dyn Robot) -> Result<(), Breach> {
     let watch = Watch::default();
     let estimate = done(robot.pose().await, "a body knows where it is")?;
@@ -62,7 +62,7 @@ async fn feels(robot: &dyn Robot, holds: bool) -> Result<(), Breach> {
     ensure(hand.holds == holds, "a hand feels whether it holds something", || format!("{hand:?}"))
 }
 
-/// Runs the checks that need an object: from `stand` the body can grasp it, and put it down freely at
+/// Runs the checks that need an object: at `stand`, the body must be able to carry out `grasp` and then
 /// `placing`.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Conformance test for any implementation of [`Robot`]: the promises of every body.
+//! Conformance test for any implementation of [`Robot`]: checks the guarantees that every body gives.
 //!
 //! The body is driven, looks, takes frames and sweeps its laser; it needs one reachable place besides its
 //! own, open doors, an empty hand, and no faults. [`check_carrying`] is for bodies with a hand and needs an
@@ -21,30 +21,30 @@ use nalgebra::{Isometry3, Point3, Vector2};
 use std::pin::Pin;
 use std::sync::Mutex;
 
-/// A violated promise.
+/// A guarantee of the [`Robot`] trait that a body violated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{promise}: {found}")]
 pub struct Breach {
-    /// Promise.
+    /// The guarantee, as one sentence.
     pub promise: &'static str,
     /// Observed behaviour.
     pub found: String,
 }
 
-/// All violated promises, in the order of the checks.
+/// All violated guarantees, in the order of the checks.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
 pub struct Breaches(pub Vec<Breach>);
 
-/// Tolerance on transforms that should be equal, for rounding, metres and radians.
+/// Tolerance for rounding on values that should be equal: metres, radians, lengths of unit vectors.
 const ROUNDING: f64 = 1e-6;
-/// Time that the messages before and after a drive may take on the clock of a body that is not simulated,
-/// seconds. From: chosen, a busy computer.
+/// Maximum time, seconds, by which a drive may take longer on the clock than the body says, for messages, if
+/// the body is not simulated. From: chosen, a busy computer.
 const LATE_S: f64 = 1.0;
 /// Maximum distance of the estimated pose from the goal after a drive, in standard deviations of the
 /// localisation.
 const ARRIVED_SIGMAS: f64 = 5.0;
-/// Number of free places of the map used for route queries.
+/// Maximum number of places, spread over the map, that are used for route queries.
 const PLACES: usize = 40;
 
 fn ensure(holds: bool, promise: &'static str, found: impl FnOnce() -> String) -> Result<(), Breach> {
@@ -55,9 +55,9 @@ fn done<T>(answer: Result<T, Failure>, promise: &'static str) -> Result<T, Breac
     answer.map_err(|f| Breach { promise, found: f.to_string() })
 }
 
-/// A running check.
+/// Future of a running check.
 type Checking<'a> = Pin<Box<dyn Future<Output = Result<(), Breach>> + Send + 'a>>;
-/// A check of a body.
+/// A check, begun for a body.
 type Check = for<'a> fn(&'a dyn Robot) -> Checking<'a>;
 
 /// All checks with their names, in the order of execution.
@@ -87,7 +87,7 @@ pub const CHECKS: [(&str, Check); 12] = [
 /// Runs every check, even after a failure.
 ///
 /// # Errors
-/// The violated promises with the observations, at most one a check, in the order of the checks.
+/// The violated guarantees with the observations, at most one for each check, in the order of the checks.
 pub async fn check(robot: &dyn Robot) -> Result<(), Breaches> {
     let mut breaches = Vec::new();
     for (_, begin) in CHECKS {
@@ -132,7 +132,7 @@ fn above_zero(x: f64) -> bool {
     x.is_finite() && x > 0.0
 }
 
-/// Names of the frames of a body.
+/// Names of the coordinate frames of a body: map, base, camera, laser.
 fn frames(body: &Description) -> Vec<&str> {
     let camera = body.camera.as_ref().map(|camera| camera.frame.as_str());
     let laser = body.laser.as_ref().map(|laser| laser.frame.as_str());
@@ -157,7 +157,7 @@ fn check_stations(robot: &dyn Robot) -> Result<(), Breach> {
     })
 }
 
-/// Distance between two transforms: the larger of metres and radians.
+/// Difference between two transforms: the larger of the distance in metres and the angle in radians.
 fn gap(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let moved = (a.translation.vector - b.translation.vector).norm();
     moved.max(a.rotation.angle_to(&b.rotation))
@@ -239,7 +239,7 @@ fn check_chain(robot: &dyn Robot, described: &Camera, sensed: &Sensed) -> Result
     ensure(off < ROUNDING, "the chain multiplies to the camera's pose", || format!("{off} off"))
 }
 
-/// Places for queries: the stations, or places all over the map.
+/// Places for route queries: the stations, or else points spread over the map; empty without both.
 fn places(robot: &dyn Robot) -> Vec<Place> {
     if let Some(stations) = robot.stations() {
         return stations.iter().map(|s| Place::Station(s.name.clone())).collect();

@@ -1,4 +1,4 @@
-//! Conformance of bodies with surfaces in their map: the camera must see them in place.
+//! Conformance of bodies with surfaces in their map: the camera must see the surfaces where the map has them.
 
 use super::{Breach, done, ensure};
 use crate::body::{Place, Pose2, Robot, Sensed, SurfaceHint, Watch};
@@ -13,19 +13,22 @@ const PLACES: usize = 4;
 const AWAY_M: [f64; 3] = [1.4, 1.7, 2.0];
 /// Number of directions of candidate viewpoints.
 const DIRECTIONS: usize = 8;
-/// Number of sample points on a surface along each direction.
+/// Number of steps in which sample points divide each triangle between an edge of a surface and its centre.
 const GRID: usize = 12;
-/// Excess range from which a point was seen through, metres, and standard deviations of the pose.
+/// Depth beyond a point of the surface, metres, from which a view counts as looking past the surface; the
+/// uncertainty of the camera pose is added.
 const FARTHER_M: f64 = 0.05;
+/// Standard deviations of the camera pose that are added to [`FARTHER_M`].
 const SIGMAS: f64 = 3.0;
-/// Minimum number of informative points, and minimum share of them at which the surface must be seen.
+/// Minimum number of sample points at which the views show the surface, or something behind it.
 const FEWEST: usize = 20;
+/// Minimum share of the sample points counted for [`FEWEST`] at which the views show the surface itself.
 const LEAST_SHARE: f64 = 0.5;
 
 const PROMISE: &str = "the camera shows the surfaces of the map where they are";
 
-/// Looks at the first visible surface of the map from several places and past its corners: a mirrored, scaled
-/// or upside-down image shows it elsewhere.
+/// Checks the first surface that the body can look at, from several places and towards its corners: a
+/// mirrored, scaled or upside-down image shows the surface elsewhere.
 pub(super) async fn check_sight(robot: &dyn Robot) -> Result<(), Breach> {
     if robot.description().camera.is_none() {
         return Ok(());
@@ -40,7 +43,8 @@ pub(super) async fn check_sight(robot: &dyn Robot) -> Result<(), Breach> {
     Ok(())
 }
 
-/// Places from which the body can look at a surface: its stations, or places around the surface.
+/// Places from which the body can look at a surface: the current place without a base, else stations, or
+/// poses around the surface; at most [`PLACES`].
 async fn places(robot: &dyn Robot, surface: &SurfaceHint) -> Result<Vec<Place>, Breach> {
     let here = done(robot.pose().await, "a body knows where it is")?.place();
     if robot.description().base.is_none() {
@@ -74,7 +78,7 @@ fn middle(surface: &SurfaceHint) -> Point2<f64> {
     Point2::from(sum / surface.outline_m.len().max(1) as f64)
 }
 
-/// One view from each place, each towards another corner.
+/// Takes a frame from each place, with the camera turned to the corners of the surface in turn.
 async fn looks(robot: &dyn Robot, surface: &SurfaceHint, places: &[Place]) -> Result<Vec<Sensed>, Breach> {
     let watch = Watch::default();
     let mut looks = Vec::new();
@@ -133,8 +137,8 @@ fn view(look: &Sensed) -> View {
     }
 }
 
-/// Number of points within a surface's outline at which a view shows it, and at which it shows
-/// something behind it. Objects on or in front of the surface do not count.
+/// Numbers of sample points within a surface's outline at which a frame shows the surface, and at which it
+/// shows something behind the surface. Points where something in front is seen do not count.
 fn shown(surface: &SurfaceHint, look: &Sensed) -> (usize, usize) {
     let middle = middle(surface);
     let (mut there, mut through) = (0, 0);

@@ -13,7 +13,7 @@ use serde::Deserialize;
 pub const PROTOCOL: u32 = 1;
 /// Maximum number of pixels in an image, and of cells in a map.
 const MOST_CELLS: usize = 1 << 25;
-/// Maximum number of readings in a sweep: a tenth of a millimetre apart at a metre all around.
+/// Maximum number of readings in a sweep: all around, at a metre, a tenth of a millimetre apart.
 const MOST_READINGS: usize = 65_536;
 /// Maximum number of surfaces, rooms, doors or stations.
 const MOST_NAMES: usize = 10_000;
@@ -27,17 +27,17 @@ pub(super) struct Hello {
     _protocol: u32,
     /// Name, for people and records.
     name: String,
-    /// True if the world is simulated too.
+    /// True if the body and its world are simulated.
     #[serde(default)]
     simulated: bool,
-    /// Start of its clock, nanoseconds.
+    /// Time on the body's clock at the start, nanoseconds.
     #[serde(default)]
     now_ns: Stamp,
     /// Base; left out for a body that stays at its only station.
     base: Option<Base>,
-    /// The depth camera; left out if there is none.
+    /// Depth camera; left out if there is none.
     camera: Option<Camera>,
-    /// Head that turns the camera; left out if nothing does.
+    /// Head that turns the camera; left out if none does.
     head: Option<Head>,
     /// Arm that pushes and grasps; left out if there is none.
     arm: Option<Arm>,
@@ -46,16 +46,16 @@ pub(super) struct Hello {
     /// Other sensors.
     #[serde(default)]
     senses: Vec<Sense>,
-    /// Names of its frames in records.
+    /// Names of the map frame and the base frame.
     #[serde(default)]
     frames: BodyFrames,
     /// Upward direction in the map frame; left out if unknown.
     up: Option<Vector3<f64>>,
-    /// Standard deviation of localisation along each axis, metres.
+    /// Standard deviation of the estimated position along each axis, metres.
     pose_sigma_m: f64,
-    /// Standard deviation of the heading, radians.
+    /// Standard deviation of the estimated heading, radians.
     pose_sigma_rad: f64,
-    /// The map of the floor; its cells follow as bytes.
+    /// Map of the floor, whose cells follow as bytes; left out if there is none.
     map: Option<Map>,
     /// Support surfaces in the map.
     #[serde(default)]
@@ -73,13 +73,13 @@ pub(super) struct Hello {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Base {
-    /// Its outline on the floor.
+    /// Outline of the base on the floor, base frame, metres.
     footprint: Footprint,
     /// Driving speed, metres a second.
     linear_m_s: f64,
     /// Speed of turning on the spot, radians a second.
     angular_rad_s: f64,
-    /// Distance to keep between the footprint and mapped obstacles, metres.
+    /// Distance that the footprint keeps from mapped obstacles, metres.
     #[serde(default = "default_clearance_m")]
     clearance_m: f64,
 }
@@ -114,10 +114,10 @@ struct Camera {
     /// Maximum time by which a frame's stamp may precede its request, seconds.
     #[serde(default)]
     latency_s: f64,
-    /// Name of its frame in records.
+    /// Name of the camera's optical frame.
     #[serde(default = "default_camera_frame")]
     frame: String,
-    /// Pose of the camera on the base, if no head turns it; the base's own pose if left out.
+    /// Pose of the camera in the base frame, if no head turns the camera; the base's own pose if left out.
     base_from_camera: Option<Isometry3<f64>>,
 }
 
@@ -144,7 +144,7 @@ struct Arm {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Laser {
-    /// Pose of the laser on the base; constant.
+    /// Constant pose of the laser in the base frame.
     base_from_laser: Isometry3<f64>,
     /// Angle of the first reading, anticlockwise from straight ahead, radians.
     first_rad: f64,
@@ -154,7 +154,7 @@ struct Laser {
     readings: usize,
     /// Maximum range, metres.
     reach_m: f64,
-    /// Name of its frame in records.
+    /// Name of the laser's frame.
     #[serde(default = "default_laser_frame")]
     frame: String,
 }
@@ -184,7 +184,7 @@ impl Default for BodyFrames {
 struct Map {
     /// Side of a cell, metres.
     resolution_m: f64,
-    /// Corner of the first cell, in the map, metres.
+    /// Outer corner of cell (0, 0), map frame, metres.
     origin_m: Point2<f64>,
     /// Cells along x.
     width: usize,
@@ -192,16 +192,16 @@ struct Map {
     height: usize,
 }
 
-/// A parsed and checked hello.
+/// Content of a parsed and checked hello.
 pub(super) struct Greeting {
     pub known: Known,
     pub clearance_m: f64,
-    /// Pose of a fixed camera on the base.
+    /// Pose of a camera that no head turns, in the base frame.
     pub base_from_camera: Isometry3<f64>,
     pub pixels: PixelFormat,
 }
 
-/// Byte layout of a frame.
+/// Byte layout of a camera frame: metres in a unit of depth, and true if colour follows the depths.
 #[derive(Clone, Copy)]
 pub(super) struct PixelFormat {
     pub unit_m: f64,
@@ -209,14 +209,15 @@ pub(super) struct PixelFormat {
 }
 
 impl PixelFormat {
-    /// Size of a frame with this many pixels, bytes: 16 bits of depth each, then red, green and blue.
+    /// Size of a frame with this many pixels, bytes: 16 bits of depth a pixel, then red, green and blue if
+    /// there is colour.
     pub fn bytes(&self, pixels: usize) -> usize {
         pixels * if self.colour { 5 } else { 2 }
     }
 }
 
 impl Hello {
-    /// Checks the message, with the bytes after its line: the cells of the map.
+    /// Checks the message; `cells` are the bytes after its line, the cells of the map.
     ///
     /// # Errors
     /// The first invalid value.

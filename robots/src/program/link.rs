@@ -10,12 +10,12 @@ use tokio::sync::mpsc;
 
 /// Maximum length of a line, bytes.
 const LONGEST_LINE: u64 = 4 << 20;
-/// Maximum number of bytes after the hello: the cells of a map.
+/// Maximum number of bytes after the hello (the first message): the cells of a map.
 const MOST_HELLO_BYTES: usize = 1 << 25;
-/// Number of buffered messages; the program blocks beyond that.
+/// Maximum number of buffered messages; a program that sends more blocks.
 const WAITING: usize = 16;
 
-/// A line with the bytes after it.
+/// A message of a program: a line of JSON, and the bytes after the line.
 pub(super) struct Message {
     pub line: String,
     pub bytes: Vec<u8>,
@@ -35,7 +35,8 @@ type Heard = Result<Message, Ended>;
 pub(super) struct Lines(Sender<String>);
 
 impl Lines {
-    /// Sends a line. If the program no longer reads, the next read reports it.
+    /// Sends a message as a line of JSON. Failures are ignored: if the program no longer reads, receiving
+    /// reports it.
     pub fn send(&self, message: &impl serde::Serialize) {
         if let Ok(mut line) = serde_json::to_string(message) {
             line.push('\n');
@@ -44,7 +45,7 @@ impl Lines {
     }
 }
 
-/// Both directions to a program.
+/// Connection to a program: sender of lines, and receiver of messages.
 pub(super) struct Link {
     lines: Lines,
     heard: mpsc::Receiver<Heard>,
@@ -52,10 +53,10 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Starts both threads, and receives the first message.
+    /// Starts the threads that read and write, and receives the first message.
     ///
     /// # Errors
-    /// If none arrives in time, or the stream ends or violates the protocol.
+    /// If no message arrives within `hello_limit`, or the stream ends or violates the protocol.
     pub fn open(
         from: impl Read + Send + 'static,
         to: impl Write + Send + 'static,
@@ -80,12 +81,12 @@ impl Link {
         }
     }
 
-    /// Sets the maximum number of bytes of further messages.
+    /// Sets the maximum number of bytes after the line of each further message.
     pub fn allow_bytes(&self, most: usize) {
         self.most_bytes.store(most, Ordering::Relaxed);
     }
 
-    /// The sender of lines.
+    /// Returns another sender of lines to the program.
     pub fn lines(&self) -> Lines {
         self.lines.clone()
     }
@@ -164,7 +165,7 @@ fn read_line(from: &mut impl BufRead) -> Result<String, Ended> {
     String::from_utf8(line).map_err(|_| Ended::Breach("a line is not UTF-8".into()))
 }
 
-/// Start of a line, shortened for display.
+/// Start of a line between backquotes, shortened for display.
 pub(super) fn start_of(line: &str) -> String {
     const SHOWN: usize = 120;
     let start: String = line.trim_end().chars().take(SHOWN).collect();

@@ -12,7 +12,7 @@ const LATEST_NS: Stamp = 4_000_000_000_000_000_000;
 /// Maximum deviation of a quaternion's length from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
 
-/// A request as a line.
+/// A request, as sent to a program in one line.
 #[derive(Serialize)]
 pub(super) struct Ask<'a> {
     pub id: u64,
@@ -21,7 +21,7 @@ pub(super) struct Ask<'a> {
     pub time_limit_s: f64,
 }
 
-/// Arguments of a request.
+/// Arguments of a request, as sent to a program.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub(super) enum Arguments<'a> {
@@ -36,7 +36,7 @@ pub(super) enum Arguments<'a> {
 }
 
 impl<'a> Arguments<'a> {
-    /// Arguments of a request; for a drive also the route on the map.
+    /// Arguments of a request; `route_m` is the route on the map and is sent with a drive only.
     pub fn of(request: &'a Request, route_m: &'a [Point2<f64>]) -> Self {
         match request {
             Request::Pose | Request::Sense | Request::Scan | Request::Hand => Arguments::Nothing {},
@@ -51,18 +51,18 @@ impl<'a> Arguments<'a> {
     }
 }
 
-/// Cancellation of a request.
+/// Cancellation of a request, as sent to a program.
 #[derive(Serialize)]
 pub(super) struct Cancel {
     pub cancel: u64,
 }
 
-/// A line of the program after its hello.
+/// A message of a program after its hello (the first message).
 #[derive(Debug, Deserialize)]
 pub(super) struct Said {
-    /// The request that this line answers.
+    /// Number of the request that this message is about.
     pub id: u64,
-    /// The body's clock, nanoseconds; monotonic.
+    /// Time on the body's clock, nanoseconds; never decreases.
     pub now_ns: Stamp,
     #[serde(flatten)]
     pub what: What,
@@ -73,7 +73,7 @@ pub(super) struct Said {
 pub(super) enum What {
     /// The request is understood and begins.
     Accepted(serde::de::IgnoredAny),
-    /// Progress.
+    /// The request is in progress.
     Feedback(Feedback),
     /// The request is completed; the content depends on the request.
     Done(serde_json::Value),
@@ -92,7 +92,8 @@ pub(super) struct Feedback {
 }
 
 impl Said {
-    /// Checks what holds for every line: a monotonic clock, finite numbers.
+    /// Checks what holds for every message: the clock is not before `before_ns`, and the values of feedback
+    /// are in range.
     ///
     /// # Errors
     /// The first invalid value.
@@ -115,13 +116,13 @@ impl Said {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PoseSaid {
-    /// Stated pose of the base now.
+    /// Estimated pose of the base in the map.
     pub map_from_base: Isometry3<f64>,
-    /// Standard deviation along each axis, metres; the hello's if left out.
+    /// Standard deviation along each axis, metres; if left out, the value in the hello holds.
     pub sigma_m: Option<f64>,
-    /// Standard deviation of the heading, radians; the hello's if left out.
+    /// Standard deviation of the heading, radians; if left out, the value in the hello holds.
     pub sigma_rad: Option<f64>,
-    /// Name of its station, if it has stations.
+    /// Name of the current station, if the body has stations.
     pub station: Option<String>,
 }
 
@@ -131,7 +132,7 @@ pub(super) struct PoseSaid {
 pub(super) struct DrivenSaid {
     /// Distance by odometry, metres.
     pub distance_m: f64,
-    /// Stated pose of the base now.
+    /// Estimated pose of the base in the map.
     pub map_from_base: Isometry3<f64>,
 }
 
@@ -139,7 +140,7 @@ pub(super) struct DrivenSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LookedSaid {
-    /// Angle by which the head's limits miss the point, radians.
+    /// Angle between the camera's axis and the point that remains because of the head's limits, radians.
     pub miss_rad: f64,
 }
 
@@ -149,9 +150,9 @@ pub(super) struct LookedSaid {
 pub(super) struct SensedSaid {
     /// Time stamp of the frame, nanoseconds on the body's clock; the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
-    /// Pose of the base at that time.
+    /// Pose of the base in the map at that time.
     pub map_from_base: Isometry3<f64>,
-    /// Pose of the camera on the base at that time.
+    /// Pose of the camera in the base frame at that time.
     pub base_from_camera: Isometry3<f64>,
 }
 
@@ -161,7 +162,7 @@ pub(super) struct SensedSaid {
 pub(super) struct ScannedSaid {
     /// Time stamp of the sweep, nanoseconds on the body's clock; the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
-    /// Pose of the base at that time.
+    /// Pose of the base in the map at that time.
     pub map_from_base: Isometry3<f64>,
 }
 
@@ -171,7 +172,7 @@ pub(super) struct ScannedSaid {
 pub(super) struct ReadSaid {
     /// Time stamp of the reading, nanoseconds on the body's clock; the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
-    /// Reading.
+    /// Measured value, any JSON.
     pub said: serde_json::Value,
 }
 
@@ -191,7 +192,7 @@ pub(super) struct GraspedSaid {
     pub width_m: f64,
 }
 
-/// Answer to `open_door` and `place`.
+/// Empty answer to `open_door` and `place`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NothingSaid {}
@@ -199,7 +200,7 @@ pub(super) struct NothingSaid {}
 /// Parses the answer to a request.
 ///
 /// # Errors
-/// The missing or malformed part.
+/// If a part is missing or malformed.
 pub(super) fn answer<T: DeserializeOwned>(request: &str, value: serde_json::Value) -> Result<T, String> {
     serde_json::from_value(value).map_err(|e| format!("its answer to {request} is none: {e}"))
 }
@@ -218,7 +219,7 @@ pub(super) fn transform(said: &Isometry3<f64>) -> Result<Isometry3<f64>, String>
     Ok(Isometry3::from_parts(said.translation, UnitQuaternion::new_normalize(quaternion)))
 }
 
-/// Checks a length or an angle.
+/// Checks a length or an angle, named `what` in messages.
 ///
 /// # Errors
 /// If it is negative or not finite.

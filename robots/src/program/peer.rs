@@ -1,16 +1,17 @@
-//! The other end of the protocol: a child process, or a running program.
+//! Robot program at the other end of the protocol: a child process, or a running program.
 
 use crate::program::process::Process;
 use crate::program::socket::Socket;
 
-/// The other end. Dropping it ends a child process, or closes the connection to a running program.
+/// Robot program at the other end. Dropping it ends a child process, or closes the connection to a running
+/// program.
 pub(super) enum Peer {
     Started(Process),
     Reached(Socket),
 }
 
 impl Peer {
-    /// Message for the end of its output.
+    /// Message for the case that the program's output has ended.
     pub fn farewell(&self) -> &'static str {
         match self {
             Self::Started(_) => "the program has ended",
@@ -27,7 +28,8 @@ impl Peer {
         }
     }
 
-    /// Exit status and last words; empty for a remote peer.
+    /// Ends the program or the connection; returns the exit status and the last lines of standard error,
+    /// empty for a connection.
     pub fn epitaph(&mut self) -> String {
         match self {
             Self::Started(process) => process.epitaph(),

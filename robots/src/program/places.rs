@@ -1,5 +1,5 @@
-//! Predictions without a question to the program: reachable places, their cost, poses of the camera. Planning
-//! makes thousands of them.
+//! Predictions made without asking the program: reachable places, cost of drives, poses of the camera.
+//! Planning makes thousands of them.
 
 use crate::body::{Door, Place, Pose2, Station, Travel};
 use crate::failure::Failure;
@@ -15,10 +15,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Maximum number of cached routers; the cache is cleared beyond that.
 const MOST_ROUTERS: usize = 64;
 
-/// Routes on the map of a program's hello.
+/// Predictions of drives and camera poses from the map in a program's hello (its first message).
 pub(super) struct Places {
     clearance_m: f64,
-    /// Pose of a fixed camera on the base.
+    /// Pose of a camera that no head turns, in the base frame.
     base_from_camera: Isometry3<f64>,
     /// Doors that ended a drive and were not opened since.
     shut: Mutex<BTreeSet<String>>,
@@ -32,7 +32,7 @@ impl Places {
         Places { clearance_m, base_from_camera, shut: Mutex::default(), routers: Mutex::default() }
     }
 
-    /// Records the state of a door.
+    /// Records that a door was found shut, or open.
     pub fn met_door(&self, name: &str, is_shut: bool) {
         let mut shut = self.shut.lock().unwrap_or_else(PoisonError::into_inner);
         if is_shut {
@@ -42,7 +42,7 @@ impl Places {
         }
     }
 
-    /// The router with these doors shut.
+    /// Router on the map with the doors named in `shut` closed.
     fn router(&self, known: &Known, (map, speeds): (&OccupancyGrid, Speeds), shut: &[String]) -> Arc<Router> {
         let mut key = shut.to_vec();
         key.sort_unstable();
@@ -62,7 +62,7 @@ impl Places {
         Arc::clone(routers.entry(key).or_insert_with(make))
     }
 
-    /// See [`Robot::travel`](crate::Robot::travel).
+    /// Predicts the cost of drives, as [`Robot::travel`](crate::Robot::travel).
     pub fn travel(
         &self,
         known: &Known,
@@ -85,8 +85,8 @@ impl Places {
         goals.into_iter().zip(found).map(|(goal, travel)| goal.and(travel)).collect()
     }
 
-    /// The route to a place for the base to follow, metres: around the doors known to be shut, up to one of
-    /// them if there is no other route. None without a map.
+    /// Finds the route for the base to a place, metres: around the doors known to be shut, or up to one of
+    /// them if there is no other route. Empty without a map or a base.
     ///
     /// # Errors
     /// [`Failure::Unreachable`] with the reason.
@@ -110,7 +110,7 @@ impl Places {
         Ok(found?.points_m)
     }
 
-    /// See [`Robot::camera_at`](crate::Robot::camera_at).
+    /// Predicts the camera's pose, as [`Robot::camera_at`](crate::Robot::camera_at).
     pub fn camera_at(
         &self,
         known: &Known,
@@ -123,19 +123,19 @@ impl Places {
         Ok(turned.unwrap_or(base * self.base_from_camera))
     }
 
-    /// Angle between the axis of a fixed camera and a point, radians.
+    /// Angle between the axis of a camera that no head turns and a point in the map, radians.
     pub fn miss_rad(&self, map_from_base: &Isometry3<f64>, point: &Point3<f64>) -> f64 {
         let seen = (map_from_base * self.base_from_camera).inverse_transform_point(point);
         seen.coords.angle(&Vector3::z())
     }
 }
 
-/// Map and speeds for driving; none without a map or a base.
+/// Map and speeds for driving; `None` without a map or a base.
 fn floor(known: &Known) -> Option<(&OccupancyGrid, Speeds)> {
     Some((known.map.as_ref()?, known.description.base.as_ref()?.speeds))
 }
 
-/// Pose of the base at a place.
+/// Pose of the base at a place, in the map.
 ///
 /// # Errors
 /// [`Failure::Unreachable`] for an unknown station, a pose where only stations exist, and numbers that are

@@ -24,13 +24,13 @@ const ENVIRONMENT: [&str; 12] = [
     "VIRTUAL_ENV",
     "LD_LIBRARY_PATH",
 ];
-/// Number of bytes of standard error that are kept.
+/// Maximum number of last bytes of standard error that are kept.
 const LAST_WORDS: usize = 4096;
-/// Number of lines of standard error that are shown.
+/// Maximum number of last lines of standard error that are shown.
 const SHOWN_LINES: usize = 6;
 /// Time for a program to exit by itself once its input is closed.
 const PARTING: Duration = Duration::from_millis(500);
-/// Interval between checks for its end.
+/// Interval between checks whether the program has ended.
 const GLANCE: Duration = Duration::from_millis(5);
 
 /// A program in a process group of its own.
@@ -43,7 +43,7 @@ impl Process {
     /// Starts a shell command line, with `memory_bytes` of address space for each of its processes.
     ///
     /// # Errors
-    /// Why it could not be started.
+    /// Reason for which the program could not be started.
     pub fn start(command_line: &str, memory_bytes: u64) -> Result<(Self, ChildStdin, ChildStdout), String> {
         // A soft limit: a program that needs more may say so in its own command line.
         let script = format!("ulimit -S -v {} 2>/dev/null\n{command_line}", memory_bytes / 1024);
@@ -82,8 +82,8 @@ impl Process {
         }
     }
 
-    /// Exit status and last lines of standard error, after it closed its output or violated the protocol;
-    /// kills its remaining processes.
+    /// Kills all processes of the program; returns the exit status and the last lines of standard error.
+    /// Called after the program closed its output or violated the protocol.
     pub fn epitaph(&mut self) -> String {
         let by_itself = self.ends_within(GLANCE * 20);
         let status = self.kill();
@@ -114,7 +114,8 @@ impl Process {
 }
 
 impl Drop for Process {
-    /// Kills the process group, after a short time for stopping the body; the input is closed by now.
+    /// Kills the process group, after a short time in which the program can stop the body; its input is
+    /// closed by now.
     fn drop(&mut self) {
         self.ends_within(PARTING);
         self.kill();
@@ -125,7 +126,7 @@ fn pid(child: &Child) -> Option<Pid> {
     Pid::from_raw(i32::try_from(child.id()).ok()?)
 }
 
-/// Keeps the end of a program's standard error.
+/// Reads a program's standard error and keeps its end.
 fn listen(mut stderr: ChildStderr, last_words: &Mutex<VecDeque<u8>>) {
     let mut chunk = [0; 1024];
     while let Ok(n @ 1..) = stderr.read(&mut chunk) {

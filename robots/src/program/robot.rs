@@ -1,4 +1,4 @@
-//! Robot trait for a program.
+//! Implementation of the [`Robot`] trait for a program.
 
 use crate::body::{
     Colour, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, Pose2, PoseEstimate,
@@ -29,17 +29,17 @@ use tokio::sync::Mutex;
 /// Limits on a program: wall-clock seconds, output, memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Time until the hello, seconds.
+    /// Maximum time from the start to the hello (the program's first message), seconds.
     pub hello_s: f64,
     /// Maximum silence during a request, seconds.
     pub silence_s: f64,
-    /// Time from a cancellation to the end of the request, seconds.
+    /// Maximum time from a cancellation to the end of the request, seconds.
     pub stop_s: f64,
-    /// Wall-clock time beyond a request's own limit, which counts on the body's clock, seconds.
+    /// Maximum wall-clock time by which a request may exceed its own limit on the body's clock, seconds.
     pub overrun_s: f64,
     /// Maximum number of progress messages in one request.
     pub feedback: usize,
-    /// Address space of each of its processes, bytes.
+    /// Maximum address space of each process of the program, bytes.
     pub memory_bytes: u64,
 }
 
@@ -62,7 +62,8 @@ impl Limits {
     }
 }
 
-/// A program as a robot. On drop its input is closed, and it is killed with all its child processes.
+/// A program as a robot. Dropping it closes the program's input, then kills the program with all its child
+/// processes.
 pub struct ProgramRobot {
     known: Known,
     places: Places,
@@ -72,21 +73,21 @@ pub struct ProgramRobot {
 }
 
 impl ProgramRobot {
-    /// Starts a shell command line as a robot and receives its hello.
+    /// Starts a shell command line as a robot and receives its hello (its first message).
     ///
     /// # Errors
-    /// [`Failure::Broken`] if it does not start, or its hello is missing or invalid.
+    /// [`Failure::Broken`] if the program does not start, or its hello is missing or invalid.
     pub fn start(command_line: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
         let broken = |because: String| Failure::Broken { because: format!("`{command_line}`: {because}") };
         let (process, stdin, stdout) = Process::start(command_line, limits.memory_bytes).map_err(broken)?;
         Self::greet(Peer::Started(process), stdout, stdin, limits).map_err(broken)
     }
 
-    /// Connects to a running robot at `HOST:PORT` or the path of a Unix socket, and receives its hello. On
-    /// drop the connection is closed. The connection is neither encrypted nor authenticated.
+    /// Connects to a running robot at `HOST:PORT` or the path of a Unix socket, and receives its hello.
+    /// Dropping the robot closes the connection, which is neither encrypted nor authenticated.
     ///
     /// # Errors
-    /// [`Failure::Broken`] if nobody answers there, or its hello is missing or invalid.
+    /// [`Failure::Broken`] if nobody answers there, or the hello is missing or invalid.
     pub fn connect(address: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
         let broken = |because: String| Failure::Broken { because: format!("{address}: {because}") };
         let socket = Socket::connect(address, limits.hello()).map_err(broken)?;
@@ -121,7 +122,8 @@ impl ProgramRobot {
         self.ask_along(request, &[], watch).await
     }
 
-    /// Sends a drive with its route on the map.
+    /// Sends a request, if the body has the required part; `route_m` is the route on the map and is used for
+    /// a drive only.
     async fn ask_along(
         &self,
         request: &Request,
@@ -200,7 +202,8 @@ impl ProgramRobot {
     }
 }
 
-/// Stamp of an answer: the stated one, or else the end of the request.
+/// Time stamp of an answer: the stated one, or else the end of the request. A stated one must lie between the
+/// two given times.
 fn stamp(what: &str, said_ns: Option<Stamp>, (before_ns, now_ns): (Stamp, Stamp)) -> Result<Stamp, String> {
     let stamp_ns = said_ns.unwrap_or(now_ns);
     match (before_ns..=now_ns).contains(&stamp_ns) {
@@ -219,7 +222,8 @@ fn level(pose: &Isometry3<f64>) -> Isometry2<f64> {
     Isometry2::new(Vector2::new(x_m, y_m), yaw_rad)
 }
 
-/// Decodes ranges, a little-endian `f32` each. Ranges beyond the reach mean no return.
+/// Decodes ranges in metres, each a little-endian `f32`. Ranges beyond the laser's reach become infinite: no
+/// return.
 fn read_ranges(laser: &Laser, bytes: &[u8]) -> Result<Vec<f64>, String> {
     if bytes.len() != 4 * laser.readings {
         return Err(format!("a sweep of {} bytes, expected {}", bytes.len(), 4 * laser.readings));
@@ -460,7 +464,7 @@ impl ProgramRobot {
         self.known.description.lacks(part)
     }
 
-    /// Checks that the body has a hand, and that the point is finite.
+    /// Checks that the body has a hand, and that the coordinates of a point are finite.
     fn hand_for(&self, point: &Point3<f64>) -> Result<(), Failure> {
         self.known.description.need(Part::Hand)?;
         match point.iter().all(|x| x.is_finite()) {

@@ -43,7 +43,7 @@ impl Socket {
         Err(last.unwrap_or_else(|| "no address has this name".into()))
     }
 
-    /// Streams of both directions.
+    /// Streams from and to the program.
     ///
     /// # Errors
     /// If the system has no more handles.

@@ -10,15 +10,15 @@ use crate::program::robot::Limits;
 use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
-/// Maximum limit of a request, seconds: unlimited in practice, but representable in any language.
+/// Maximum time limit that is sent with a request, seconds: in effect none, but a number in any language.
 const LONGEST_S: f64 = 1e9;
-/// Slack on a request's limit on the body's clock: the last step before it is cancelled.
+/// Time by which a request may exceed its limit on the body's clock before it is cancelled, nanoseconds.
 const CLOCK_SLACK_NS: Stamp = 50_000_000;
 
 /// Interval between checks of a silent program.
 const GLANCE: Duration = Duration::from_millis(200);
 
-/// Answer to a request.
+/// Final answer to a request, with the body's clock before and after.
 pub(super) struct Done {
     pub said: serde_json::Value,
     pub bytes: Vec<u8>,
@@ -27,24 +27,24 @@ pub(super) struct Done {
 }
 
 impl Done {
-    /// Duration on the body's clock, seconds.
+    /// Duration of the request on the body's clock, seconds.
     pub fn duration_s(&self) -> f64 {
         (self.now_ns - self.before_ns) as f64 * 1e-9
     }
 }
 
-/// The exchange with a program.
+/// Exchange with a program: its connection, its limits, its clock, and the open request.
 pub(super) struct Talk {
     line: Option<(Link, Peer)>,
     ended: String,
     limits: Limits,
     pub now_ns: Stamp,
     next_id: u64,
-    /// The request without an answer so far.
+    /// Number of the request that has no final answer yet.
     open: Option<u64>,
 }
 
-/// Waiter for an answer; dropping it early cancels the request.
+/// Guard of a request whose answer is awaited; dropping it before the answer cancels the request.
 struct Asker {
     id: u64,
     lines: Lines,
@@ -59,14 +59,14 @@ impl Drop for Asker {
     }
 }
 
-/// Reason for which no message came.
+/// Reason for which no message came: the deadline passed, the stream ended, or the program was ended before.
 enum Silence {
     Late,
     Ended(Ended),
     Gone,
 }
 
-/// Reason for stopping a request.
+/// A request that was cancelled: the deadline for its end, and the failure to report.
 struct Stopping {
     by: Instant,
     failure: Failure,
@@ -77,7 +77,8 @@ impl Talk {
         Talk { line: Some((link, peer)), ended: String::new(), limits, now_ns, next_id: 1, open: None }
     }
 
-    /// Ends the program after a violation or its exit: kills it (or closes the connection); it stays broken.
+    /// Ends the program after a violation or its exit: kills it, or closes the connection. Every later
+    /// request fails.
     pub fn end(&mut self, because: String) -> Failure {
         if let Some((link, mut peer)) = self.line.take() {
             drop(link);
@@ -86,7 +87,7 @@ impl Talk {
         Failure::Broken { because: self.ended.clone() }
     }
 
-    /// Carries out a request.
+    /// Sends a request and waits for the final answer.
     pub async fn ask(
         &mut self,
         request: &'static str,
@@ -109,7 +110,7 @@ impl Talk {
         done
     }
 
-    /// Waits for the end of a request whose waiter was dropped.
+    /// Waits for the end of a request whose caller stopped waiting.
     async fn settle(&mut self) -> Result<(), Failure> {
         let Some(id) = self.open else { return Ok(()) };
         let by = self.within(self.limits.stop_s);
@@ -202,7 +203,8 @@ impl Talk {
         Stopping { by: self.within(self.limits.stop_s), failure }
     }
 
-    /// The failure reported by the program; for a cancellation, the reason for cancelling.
+    /// Failure to report for one that the program states: for a cancellation, the reason for cancelling, or
+    /// [`Failure::Blocked`] if this side did not cancel.
     fn failed(&mut self, failure: Failure, stopping: Option<Stopping>) -> Failure {
         match (failure, stopping) {
             (Failure::Cancelled { .. }, Some(stop)) => stop.failure,
@@ -218,8 +220,8 @@ impl Talk {
         Instant::now() + Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(far).min(far)
     }
 
-    /// Receives the next message. The end of the program is noticed even if one of its child processes keeps
-    /// the output open.
+    /// Receives the next message until the deadline `by`. The end of the program is noticed even if one of
+    /// its child processes keeps the output open.
     async fn message(&mut self, by: Instant) -> Result<Message, Silence> {
         let Some((link, peer)) = &mut self.line else { return Err(Silence::Gone) };
         let mut gone = false;
@@ -234,11 +236,11 @@ impl Talk {
         }
     }
 
-    /// Receives the next message about a request.
+    /// Receives the next message about request `id` until the deadline `by`.
     ///
     /// # Errors
-    /// [`Failure::TimedOut`] if none arrives in time and there is no `complaint`; otherwise the program is
-    /// ended.
+    /// [`Failure::TimedOut`] if none arrives and `complaint` is empty; else [`Failure::Broken`], and the
+    /// program is ended.
     async fn hear(&mut self, id: u64, by: Instant, complaint: &str) -> Result<(Said, Vec<u8>), Failure> {
         let message = match self.message(by).await {
             Ok(message) => message,
@@ -266,7 +268,7 @@ impl Talk {
     }
 }
 
-/// Parses a line about the open request.
+/// Parses and checks a message about the open request `id`.
 fn read(message: &Message, id: u64, before_ns: Stamp) -> Result<Said, String> {
     let said: Said = serde_json::from_str(&message.line).map_err(|e| {
         format!(

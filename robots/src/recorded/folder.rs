@@ -1,4 +1,4 @@
-//! Files of a recording.
+//! Recording as a folder of depth frames with poses, in descry's own layouts.
 
 use crate::input::InputError;
 use crate::recorded::picture;
@@ -21,19 +21,19 @@ const COLOUR_SUFFIXES: [&str; 3] = [".color.jpg", ".color.jpeg", ".color.png"];
 const LIST_DEPTH_ENDINGS: [&str; 2] = ["pgm", "png"];
 const LIST_COLOUR_ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// Maximum distance of a typical station from the first, metres.
+/// Maximum median distance of the frames' poses from the first pose, metres.
 const FARTHEST_TYPICAL_M: f64 = 100.0;
 
 /// A frame on disk with its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredFrame {
-    /// The station's name.
+    /// Name of the frame and of its station.
     pub name: String,
     /// Depth image, 16 bits a pixel.
     pub depth: PathBuf,
     /// Colour image, if there is one.
     pub colour: Option<PathBuf>,
-    /// Pose of the camera.
+    /// Pose of the camera's optical frame in the world of the recording, metres.
     pub world_from_camera: Isometry3<f64>,
 }
 
@@ -46,15 +46,15 @@ pub struct Recording {
     pub frames: Vec<StoredFrame>,
     /// The depth camera.
     pub intrinsics: Intrinsics,
-    /// Index of the first station.
+    /// Index in `frames` of the station where the body starts.
     pub start: usize,
     /// Contents of `recording.toml`.
     pub settings: Settings,
-    /// Frames without a pose because tracking was lost; they are not stations.
+    /// Names of the frames without a pose because tracking was lost; they are not stations.
     pub lost: Vec<String>,
 }
 
-/// A frame before its pose is known to exist.
+/// A frame whose pose may be missing.
 struct Candidate {
     name: String,
     depth: PathBuf,
@@ -149,7 +149,7 @@ pub(crate) fn read(path: &Path) -> Result<String, InputError> {
     })
 }
 
-/// Finds the folder of the frames and its settings.
+/// Finds the folder of the frames, and reads its settings.
 fn find(path: &Path) -> Result<(PathBuf, Settings), InputError> {
     let (folder, file) = if path.is_dir() {
         (path.to_path_buf(), path.join(SETTINGS_FILE))
@@ -173,7 +173,7 @@ fn find(path: &Path) -> Result<(PathBuf, Settings), InputError> {
     Ok((folder, settings))
 }
 
-/// Names in a folder in natural order: `9` before `10`.
+/// Names of the entries of a folder in natural order: `9` before `10`.
 pub(crate) fn names(folder: &Path) -> Result<Vec<String>, InputError> {
     let listed = fs::read_dir(folder).and_then(|entries| {
         entries
@@ -293,8 +293,8 @@ pub(crate) fn stem(file: &str) -> &str {
     Path::new(file).file_stem().and_then(OsStr::to_str).unwrap_or(file)
 }
 
-/// Rejects poses that are not in metres: most of them lie farther from the first than the extent of any
-/// building.
+/// Rejects poses whose median distance from the first is larger than a building: they are probably not in
+/// metres.
 pub(crate) fn check_distances<'a>(
     folder: &Path,
     mut poses: impl Iterator<Item = (&'a str, &'a Isometry3<f64>)>,

@@ -1,5 +1,5 @@
-//! Import of recordings in published layouts: resolves units, selects frames, and provides a body
-//! or our own layout.
+//! Import of recordings in published layouts: resolves units, selects frames, and gives a robot or a
+//! recording in descry's own layout.
 
 use crate::body::Colour;
 use crate::input::InputError;
@@ -18,55 +18,56 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// Default distance between selected frames, metres. From: chosen.
+/// Default minimum distance between selected frames, metres. From: chosen.
 pub const SPACING_M: f64 = 0.2;
-/// Lever arm that converts a camera rotation to a distance, metres: the distance of the scene.
+/// Typical distance of the scene, metres, by which a rotation of the camera counts as a displacement.
 /// From: chosen.
 const LEVER_M: f64 = 0.6;
-/// Mean angle between up and the images' upward direction, radians, beyond which the stated up
-/// contradicts the cameras' attitude. From: chosen, that of perception.
+/// Maximum angle between the stated up and the mean upward direction of the images, radians; beyond it the
+/// stated up is dropped. From: chosen, that of perception.
 const HELD_RAD: f64 = 1.2;
 /// Distance of the first pose from the origin beyond which positions are recentred, metres: single precision blurs farther ones. From: chosen.
 const FARTHEST_M: f64 = 100.0;
-/// Units in a metre of depth images made from floating point: half a millimetre, up to 32 m.
+/// Units in a metre of depth images that are converted from floating point: steps of half a millimetre, up to
+/// 32 m.
 const FINE_SCALE: f64 = 2000.0;
 
 /// Choices of the user.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// Facts that the folder does not state.
+    /// Facts that the user gives because the folder does not state them.
     pub asked: Asked,
-    /// Units and conventions.
+    /// Units and conventions that the user gives.
     pub given: Given,
-    /// Distance between the frames that are kept, metres; 0 keeps all.
+    /// Minimum distance between selected frames, metres; 0 keeps all, `None` means [`SPACING_M`].
     pub spacing_m: Option<f64>,
 }
 
-/// A recording in a published layout, understood.
+/// A recording in a published layout, with its units resolved and its frames selected.
 pub struct Imported {
     /// Name for people.
     pub name: String,
-    /// The layout.
+    /// Published layout of the files.
     pub layout: &'static Layout,
-    /// Conventions of the numbers.
+    /// Units and conventions of the numbers in the files.
     pub reading: Conventions,
-    /// Frames that are kept.
+    /// Selected frames.
     pub frames: Vec<ImportedFrame>,
     /// Depth camera of all frames.
     pub intrinsics: Intrinsics,
-    /// Settings of our own layout.
+    /// Settings of the recording in descry's own layout.
     pub settings: Settings,
-    /// Notes for people: reasons, assumptions, frames left out.
+    /// Notes for people: reasons, assumptions, frames that were left out.
     pub notes: Vec<String>,
     stated: Stated,
 }
 
-/// A frame that is kept.
+/// A selected frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportedFrame {
     /// Name of the station.
     pub name: String,
-    /// Pose of the optical frame, metres.
+    /// Pose of the camera's optical frame in the world, metres.
     pub world_from_camera: Isometry3<f64>,
     index: usize,
 }
@@ -75,7 +76,7 @@ impl Imported {
     /// Reads a recording in a published layout.
     ///
     /// # Errors
-    /// An unknown layout, a missing or broken part, or units that cannot be told: with the place and a fix.
+    /// An unknown layout, a missing or broken part, or units that remain ambiguous: with the place and a fix.
     pub fn open(path: &Path, options: &Options) -> Result<Imported, InputError> {
         let (layout, stated) = layouts::read(path, &options.asked)?;
         let mut notes = stated.notes.clone();
@@ -121,7 +122,7 @@ impl Imported {
         Ok(Imported { name, layout, reading, frames, intrinsics, settings, notes, stated })
     }
 
-    /// Depth image of a frame, resampled to the common camera, in file units.
+    /// Depth image of a frame, resampled to the common camera, in the units of the files.
     fn depth(&self, frame: &ImportedFrame) -> Result<RawDepth, InputError> {
         let depth = self.stated.images.depth(frame.index)?;
         let size = (self.intrinsics.width, self.intrinsics.height);
@@ -138,12 +139,13 @@ impl Imported {
         Ok(self.resampled(depth, &self.stated.frames[frame.index].camera))
     }
 
-    /// True if a frame's files can be copied unchanged.
+    /// True if a frame has the common camera, so that its files can be copied unchanged.
     fn is_verbatim(&self, frame: &ImportedFrame) -> bool {
         Some(self.stated.frames[frame.index].camera) == self.settings.camera
     }
 
-    /// Looks up each pixel's ray in an image of another camera at the same place.
+    /// Resamples a depth image of the camera `from` to the common camera at the same place; pixels outside
+    /// become NaN.
     fn resampled(&self, depth: RawDepth, from: &CameraSettings) -> RawDepth {
         if Some(*from) == self.settings.camera {
             return depth;
@@ -157,7 +159,8 @@ impl Imported {
         RawDepth { units: (0..depth.units.len()).map(unit).collect(), ..depth }
     }
 
-    /// Writes the frames that are kept in our own layout into a new or empty folder. `progress` hears how many are written.
+    /// Writes the selected frames in descry's own layout into a new or empty folder; `progress` receives the
+    /// numbers of frames written and of all frames.
     ///
     /// # Errors
     /// If the folder holds something, cannot be written, or a frame cannot be read.
@@ -265,7 +268,7 @@ impl Footage for Imported {
     }
 }
 
-/// A frame that cannot be read, or a file that cannot be written.
+/// Failure to read a frame, or to write a file.
 enum Failed {
     Input(InputError),
     Output(std::path::PathBuf, std::io::Error),
@@ -289,13 +292,14 @@ fn write_depth(path: &Path, depth: &RawDepth, from: f64, to: f64) -> std::io::Re
     image.save(path).map_err(std::io::Error::other)
 }
 
-/// True if cameras have a usual attitude under this up direction.
+/// True if the mean upward direction of the images is within [`HELD_RAD`] of `up`.
 fn are_held_upright(poses: &[Isometry3<f64>], up: &[f64; 3]) -> bool {
     let upper: Vector3<f64> = poses.iter().map(|pose| -(pose * Vector3::y())).sum();
     upper.angle(&Vector3::from(*up)) < HELD_RAD
 }
 
-/// Moves positions far from the origin by whole metres; returns a note with the offset.
+/// Shifts positions by whole metres if the first is far from the origin; returns a note with the offset, else
+/// `None`.
 fn recentre(poses: &mut [Isometry3<f64>]) -> Option<String> {
     let offset: Vector3<f64> = poses.first()?.translation.vector.map(f64::round);
     if offset.norm() <= FARTHEST_M {
@@ -305,8 +309,8 @@ fn recentre(poses: &mut [Isometry3<f64>]) -> Option<String> {
     Some(format!("positions are recentred: {} {} {} m is taken off each", offset.x, offset.y, offset.z))
 }
 
-/// Frames at least `spacing_m` from all earlier selected ones; rotations count by the displacement
-/// of the scene.
+/// Indices of the frames to keep, each at least `spacing_m` from all earlier kept ones; a rotation counts as
+/// the displacement of the scene that it causes.
 fn spaced(poses: &[Isometry3<f64>], spacing_m: f64) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();
     for (i, pose) in poses.iter().enumerate() {

@@ -1,19 +1,20 @@
-//! Recordings as robots: frames of a folder or of a record ([`RecordedRobot`]), and a run with all
-//! requests to its body and their answers ([`TapedRobot`]).
+//! Recordings as robots: frames of a folder or of a record ([`RecordedRobot`]), and runs in which all
+//! requests to a body are stored with their answers ([`TapedRobot`]).
 //!
-//! A folder of depth frames with poses is a robot: it can stand where a frame was taken, and looking returns that frame.
+//! A folder of depth frames with poses is a robot: it can stand where a frame was taken, and taking a frame
+//! there returns that frame.
 //!
-//! Two layouts are descry's own; others are in [`layouts`], and become own ones by [`import`]:
+//! Two layouts are descry's own. [`import`] reads the published ones in [`layouts`] and converts them:
 //!
 //! | | frames side by side | lists |
 //! |---|---|---|
 //! | depth, 16 bits | `NAME.depth.png` | `depth/NAME.pgm` or `.png` |
-//! | pose (`world_from_camera`) | `NAME.pose.txt`, 4x4 | `pose.txt`, a line `tx ty tz qx qy qz qw` a frame, in the order of the names |
+//! | pose (`world_from_camera`) | `NAME.pose.txt`, 4x4 | `pose.txt`, `tx ty tz qx qy qz qw` a line, in order of names |
 //! | colour, may be absent | `NAME.color.jpg` or `.png` | `color/NAME.png` or `.jpg` |
 //! | camera | `camera-intrinsics.txt`, 3x3 | `[camera]` in `recording.toml` |
 //!
-//! A depth of 0 or of the greatest value is "no return". What the folder does not say stands in a `recording.toml` in it, or anywhere
-//! else with a `folder` entry; the robot is opened by the folder or by that file:
+//! A depth of 0 or of the greatest value is "no return". Other facts stand in a `recording.toml` in the
+//! folder, or anywhere else with a `folder` entry; the robot is opened by the folder or by that file:
 //!
 //! ```toml
 //! name = "dining room"

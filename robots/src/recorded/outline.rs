@@ -8,15 +8,15 @@ pub(crate) const WIDEST_SURFACE_M: f64 = 30.0;
 pub(crate) const WIDEST_ROOM_M: f64 = 300.0;
 /// Maximum height of a surface above or below the map's origin, metres.
 const HIGHEST_M: f64 = 100.0;
-/// Minimum area, square metres: less than the footprint of any object.
+/// Minimum area of an outline, square metres: less than the footprint of any object.
 const LEAST_AREA_M2: f64 = 1e-4;
-/// Maximum number of corners, since every pair of edges is compared.
+/// Maximum number of corners of an outline, since every pair of edges is compared.
 const MOST_CORNERS: usize = 1000;
 
-/// Description of a fault, and the expected form.
+/// Description of a fault, and of the expected form.
 pub(crate) type Fault = (String, &'static str);
 
-/// Checks the corners of an outline, in order, metres.
+/// Checks an outline, given by its corners in order, metres.
 ///
 /// # Errors
 /// If it is malformed, wider than `widest_m`, without area, or crosses itself.
@@ -65,7 +65,7 @@ fn area(corners: &[Point2<f64>]) -> f64 {
     doubled.abs() / 2.0
 }
 
-/// First two crossing edges, by their starting corners, counted from 1.
+/// First two edges that cross, each by the number of its first corner, from 1; `None` if no edges cross.
 fn crossing(corners: &[Point2<f64>]) -> Option<(usize, usize)> {
     let n = corners.len();
     let edge = |i: usize| (corners[i], corners[(i + 1) % n]);

@@ -15,12 +15,12 @@ pub struct RawDepth {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Depths along the optical axis.
+    /// Depth of each pixel along the optical axis.
     pub units: Vec<f32>,
 }
 
 impl RawDepth {
-    /// A depth image of 16 bits, whose least and greatest values are "no return".
+    /// Converts a depth image of 16 bits, whose least and greatest values mean "no return".
     pub(crate) fn of_16_bits(width: usize, height: usize, pixels: &[u16]) -> RawDepth {
         let unit = |&d: &u16| if matches!(d, 0 | u16::MAX) { f32::NAN } else { f32::from(d) };
         RawDepth { width, height, units: pixels.iter().map(unit).collect() }
@@ -32,7 +32,7 @@ pub(crate) fn depth(path: &Path) -> Result<RawDepth, InputError> {
     of_depth(&shown(path), decode(path)?)
 }
 
-/// Reads a depth image of 16 bits from the bytes of a file inside `place`.
+/// Decodes a depth image of 16 bits from bytes; `place` names their origin in messages.
 pub(crate) fn depth_within(place: &str, bytes: &[u8]) -> Result<RawDepth, InputError> {
     of_depth(place, within(place, bytes)?)
 }
@@ -47,7 +47,7 @@ pub(crate) fn colour(path: &Path) -> Result<RgbImage, InputError> {
     Ok(decode(path)?.into_rgb8())
 }
 
-/// Reads a colour image from the bytes of a file inside `place`.
+/// Decodes a colour image from bytes; `place` names their origin in messages.
 pub(crate) fn colour_within(place: &str, bytes: &[u8]) -> Result<RgbImage, InputError> {
     Ok(within(place, bytes)?.into_rgb8())
 }

@@ -10,7 +10,7 @@ const ROTATION_TOLERANCE: f64 = 0.03;
 /// Tolerance on the fixed entries of a camera matrix.
 const CAMERA_TOLERANCE: f64 = 1e-6;
 
-/// A pose; none if tracking was lost (entries that are not finite).
+/// A pose; `None` if tracking was lost (entries that are not finite).
 pub(crate) type MaybePose = Option<Isometry3<f64>>;
 
 /// The numbers of each line that is neither empty nor a comment, with the byte offset of the line.
@@ -38,7 +38,7 @@ pub(crate) fn rows(file: &str, text: &str) -> Result<Vec<(usize, Vec<f64>)>, Inp
     Ok(rows)
 }
 
-/// A square matrix: `size` lines of `size` numbers.
+/// Rows of a square matrix, `size` lines of `size` numbers, with the byte offset of each line.
 fn matrix(file: &str, text: &str, size: usize, what: &str) -> Result<Vec<(usize, Vec<f64>)>, InputError> {
     let rows = rows(file, text)?;
     if let Some((byte, row)) = rows.iter().find(|(_, row)| row.len() != size) {
@@ -101,7 +101,7 @@ pub(crate) fn listed_poses(file: &str, text: &str) -> Result<Vec<MaybePose>, Inp
         .collect()
 }
 
-/// Pose of `tx ty tz qx qy qz qw` at a byte of a text.
+/// Pose from the numbers `tx ty tz qx qy qz qw` at a byte of a text.
 pub(crate) fn of_seven(
     file: &str,
     text: &str,
@@ -120,7 +120,7 @@ pub(crate) fn of_seven(
     Ok(Some(Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation)))
 }
 
-/// Pose at a time between two poses that are at most `gap_s` apart, or at the time of one. Poses
+/// Pose at a time between two poses that are at most `gap_s` apart, or at the time of one, else `None`. Poses
 /// are in order of time, seconds.
 pub(crate) fn interpolated(
     poses: &[(f64, Isometry3<f64>)],
@@ -141,7 +141,7 @@ pub(crate) fn interpolated(
     })
 }
 
-/// Parses a 3x3 camera matrix for images of this size.
+/// Parses a 3x3 camera matrix for images of a size, columns and rows.
 pub(crate) fn camera_matrix(
     file: &str,
     text: &str,

@@ -1,7 +1,9 @@
-//! Units and conventions of a recording: candidates, and the share of each view that the others confirm.
+//! Resolution of the units and conventions of a recording.
 //!
-//! Under the right reading, what one view shows lies where a neighbouring view measures it. Under a wrong one (inverse poses, axes of
-//! another library, millimetres taken for metres) most of it does not. One score judges all candidates.
+//! A *reading* is one choice of units and conventions. Under the right one, what a view shows lies where a
+//! neighbouring view measures it. Under a wrong one (inverse poses, axes of another library, millimetres
+//! taken for metres) most of it does not. The score of a reading is the share of points that neighbouring
+//! views confirm.
 
 use crate::recorded::picture::RawDepth;
 use crate::recorded::settings::CameraSettings;
@@ -11,36 +13,36 @@ use std::fmt;
 
 /// Tolerance on the depth of a point in another view, as a share of the depth: noise and slanted surfaces. From: chosen.
 const TOLERANCE: f64 = 0.02;
-/// Minimum share of points that confirm a correct reading; objects move, and depth is noisy at
-/// edges. From: chosen.
+/// Minimum share of points confirmed by neighbouring views for a correct reading, since objects move, and
+/// depth is noisy at edges. From: chosen.
 const LEAST_AGREEMENT: f64 = 0.6;
-/// Difference of two shares below which they count as equal. From: chosen.
+/// Difference of two scores below which they count as equal. From: chosen.
 pub(crate) const MARGIN: f64 = 0.1;
-/// Minimum share of the points that must meet a measurement of the other view before a share says
-/// anything. From: chosen.
-const LEAST_OVERLAP: f64 = 0.05;
-/// Share of points unchanged between two views, above which the pair is uninformative about motion.
+/// Minimum share of the sampled points that the other view must confirm or contradict for a score above zero.
 /// From: chosen.
+const LEAST_OVERLAP: f64 = 0.05;
+/// Share of points at the same pixel and depth in two views, from which the camera has not moved enough to
+/// tell readings apart. From: chosen.
 const STILL: f64 = 0.85;
 /// Typical depths of cameras in rooms, metres. From: chosen.
 const PLAUSIBLE_M: [f64; 2] = [0.15, 15.0];
-/// Points compared in each direction of a pair of views. From: chosen.
+/// Number of points of each view that are compared with the other view of a pair. From: chosen.
 const POINTS: usize = 400;
 /// Units of a depth image in a metre: millimetres, TUM's, Replica's, a quarter of a millimetre, metres, centimetres, inches.
 const DEPTH_SCALES: [f64; 7] = [1000.0, 5000.0, 6553.5, 4000.0, 1.0, 100.0, 1.0 / 0.0254];
-/// Units of a position: metres, millimetres, centimetres, inches.
+/// Candidate units of a position, metres: metre, millimetre, centimetre, inch.
 const POSE_UNITS_M: [f64; 4] = [1.0, 0.001, 0.01, 0.0254];
 
-/// Direction of a stated pose.
+/// Direction of the poses of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Poses {
-    /// The camera's place in the world.
+    /// Pose of the camera in the world.
     WorldFromCamera,
-    /// The inverse, often called extrinsics.
+    /// Inverse pose, world to camera, often called extrinsics.
     CameraFromWorld,
 }
 
-/// Axes of the camera in stated poses.
+/// Axes of the camera frame to which the poses refer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axes {
     /// x right, y down, z forward.
@@ -55,7 +57,7 @@ impl Poses {
     /// Both directions.
     pub const ALL: [Poses; 2] = [Poses::WorldFromCamera, Poses::CameraFromWorld];
 
-    /// Name as an option's value.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Poses::WorldFromCamera => "world-from-camera",
@@ -68,7 +70,7 @@ impl Axes {
     /// All conventions.
     pub const ALL: [Axes; 3] = [Axes::Optical, Axes::OpenGl, Axes::Body];
 
-    /// Name as an option's value.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Axes::Optical => "optical",
@@ -88,12 +90,12 @@ impl Axes {
     }
 }
 
-/// Meaning of the numbers of a recording.
+/// A choice of the units and conventions of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conventions {
-    /// Convention of the poses: world-from-camera or camera-from-world.
+    /// Direction of the poses.
     pub poses: Poses,
-    /// Axes of the camera.
+    /// Axes of the camera frame.
     pub axes: Axes,
     /// Unit of the positions, metres.
     pub pose_unit_m: f64,
@@ -102,12 +104,13 @@ pub struct Conventions {
 }
 
 impl Conventions {
-    /// Poses of the optical frame in the world, in metres, and depths of this scale.
+    /// Conventions of poses world-from-camera, with optical axes and in metres, and of `depth_scale` units of
+    /// depth in a metre.
     pub fn usual(depth_scale: f64) -> Conventions {
         Conventions { poses: Poses::WorldFromCamera, axes: Axes::Optical, pose_unit_m: 1.0, depth_scale }
     }
 
-    /// Pose of the optical frame in the world, metres.
+    /// Converts a stated pose to the pose of the optical frame in the world, metres.
     pub fn world_from_camera(&self, stated: &Isometry3<f64>) -> Isometry3<f64> {
         let translation = Translation3::from(stated.translation.vector * self.pose_unit_m);
         let in_metres = Isometry3::from_parts(translation, stated.rotation);
@@ -118,7 +121,7 @@ impl Conventions {
         world_from_axes * self.axes.rotation_from_optical()
     }
 
-    /// Number of choices in which two readings differ.
+    /// Number of units and conventions in which two readings differ.
     fn differs(&self, other: &Conventions) -> usize {
         [
             self.poses != other.poses,
@@ -148,12 +151,12 @@ fn rounded(scale: f64) -> f64 {
     (scale * 1e4).round() / 1e4
 }
 
-/// Choices that the user has made.
+/// Units and conventions that the user gives; `None` for those to be resolved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Given {
-    /// Convention of the poses: world-from-camera or camera-from-world.
+    /// Direction of the poses.
     pub poses: Option<Poses>,
-    /// Axes of the camera.
+    /// Axes of the camera frame.
     pub axes: Option<Axes>,
     /// Unit of the positions, metres.
     pub pose_unit_m: Option<f64>,
@@ -179,14 +182,14 @@ impl Given {
     }
 }
 
-/// View as stored.
+/// A depth view as stored in the recording.
 #[derive(Clone, Debug)]
 pub struct StatedView {
-    /// Stated pose.
+    /// Pose in the units and convention of the files.
     pub pose: Isometry3<f64>,
-    /// The camera.
+    /// Depth camera.
     pub camera: CameraSettings,
-    /// Stored depths.
+    /// Depth image, in the units of the files.
     pub depth: RawDepth,
 }
 
@@ -195,7 +198,7 @@ impl StatedView {
         self.camera.with_size((self.depth.width, self.depth.height))
     }
 
-    /// Column, row and stored depth of pixels spread over the image.
+    /// Column, row and stored depth of some pixels, spread over the image.
     fn sampled(&self) -> impl Iterator<Item = (f64, f64, f64)> {
         let (pixels, width) = (self.depth.units.len(), self.depth.width.max(1));
         // A step that shares no factor with usual widths meets all columns.
@@ -204,7 +207,7 @@ impl StatedView {
         (0..pixels).step_by(step).map(at).filter(|(_, _, d)| d.is_finite() && *d > 0.0)
     }
 
-    /// Minimum and maximum stored depth around a pixel.
+    /// Minimum and maximum stored depth in the 3x3 pixels around a pixel; `None` without a return.
     fn around(&self, pixel: usize) -> Option<(f64, f64)> {
         let (width, height) = (self.depth.width, self.depth.height);
         let (column, row) = (pixel % width, pixel / width);
@@ -222,17 +225,17 @@ impl StatedView {
     }
 }
 
-/// Comparison of views under a reading.
+/// Counts of the points of views that were compared under one reading: sampled, confirmed and contradicted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Tally {
     sampled: usize,
     agree: usize,
-    /// Points that lie where the other view saw through.
+    /// Number of points that lie in front of what the other view measures.
     contradicted: usize,
 }
 
 impl Tally {
-    /// Share of the comparable points that agree; zero where too few are comparable.
+    /// Share of the confirmed points among the confirmed and contradicted ones; 0 if these are too few.
     fn share(&self) -> f64 {
         let comparable = (self.agree + self.contradicted) as f64;
         if comparable < 1.0 || comparable < LEAST_OVERLAP * self.sampled as f64 {
@@ -241,8 +244,8 @@ impl Tally {
         self.agree as f64 / comparable
     }
 
-    /// Compares the points of one view with another's depth; points behind the measured surface are
-    /// occluded and ignored.
+    /// Compares the points of one view with the depth image of another; points behind the measured surface
+    /// may be occluded and are not counted.
     fn compare(&mut self, from: &StatedView, to: &StatedView, to_from_from: &Isometry3<f64>, scale: f64) {
         let (camera, other) = (from.intrinsics(), to.intrinsics());
         for (column, row, depth) in from.sampled() {
@@ -260,12 +263,12 @@ impl Tally {
     }
 }
 
-/// Two views that see much of the same from different places.
+/// Two views that show much of the same from different places.
 #[derive(Clone, Debug)]
 pub struct Pair(pub StatedView, pub StatedView);
 
 impl Pair {
-    /// True if the camera moved enough to distinguish readings: the pixels of one view differ in
+    /// True if the camera moved enough to tell readings apart: most pixels of one view differ from those of
     /// the other.
     pub fn tells(&self) -> bool {
         let mut tally = Tally::default();
@@ -275,7 +278,7 @@ impl Pair {
     }
 }
 
-/// Share of one view's points that the other confirms, over all pairs.
+/// Score of a reading: share of the comparable points that the other view of their pair confirms.
 pub(crate) fn agreement(reading: &Conventions, pairs: &[Pair]) -> f64 {
     let mut tally = Tally::default();
     for Pair(a, b) in pairs {
@@ -288,7 +291,7 @@ pub(crate) fn agreement(reading: &Conventions, pairs: &[Pair]) -> f64 {
     tally.share()
 }
 
-/// Median stored depth.
+/// Median stored depth over all pairs, in the units of the files; `None` without a return.
 fn typical(pairs: &[Pair]) -> Option<f64> {
     let views = pairs.iter().flat_map(|Pair(a, b)| [a, b]);
     let mut depths: Vec<f64> = views.flat_map(StatedView::sampled).map(|(_, _, depth)| depth).collect();
@@ -296,7 +299,8 @@ fn typical(pairs: &[Pair]) -> Option<f64> {
     depths.get(depths.len() / 2).copied()
 }
 
-/// All readings consistent with the user's statements, the stated one first.
+/// All readings that agree with what the user gives, ordered by the number of differences from `stated`,
+/// which is first.
 fn candidates(stated: &Conventions, given: &Given) -> Vec<Conventions> {
     fn one_or<T: Copy>(given: Option<T>, all: &[T]) -> Vec<T> {
         given.map_or(all.to_vec(), |g| vec![g])
@@ -324,10 +328,11 @@ fn candidates(stated: &Conventions, given: &Given) -> Vec<Conventions> {
     all
 }
 
-/// Chooses the reading under which the views agree; with the reason, for people.
+/// Chooses the reading under which the views agree, `stated` if that is among the best; also returns a note
+/// for people with the reason.
 ///
 /// # Errors
-/// The question that is left, and its answers as options: several readings fit alike, or none does.
+/// The open question, and the options that answer it: several readings fit alike, or none does.
 pub fn settle(
     stated: &Conventions,
     given: &Given,

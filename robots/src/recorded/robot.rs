@@ -1,4 +1,4 @@
-//! Robot trait for a recording.
+//! Implementation of the [`Robot`] trait for a recording.
 
 use crate::body::{
     Colour, Door, Driven, Looked, Place, PoseEstimate, Progress, Robot, Room, Sensed, Stamp,
@@ -20,7 +20,7 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Time for a frame on the body's clock, seconds.
+/// Time that taking a frame costs on the body's clock, seconds.
 const FRAME_S: f64 = 0.1;
 
 /// A recording as a robot. Its base is the camera; it stands at one of its frames and has no map.
@@ -40,8 +40,8 @@ struct State {
 }
 
 impl RecordedRobot {
-    /// Opens a folder of frames, a `recording.toml` that names one, or a recording in a published layout; with notes for people on
-    /// what was assumed of the latter.
+    /// Opens a folder of frames, a `recording.toml` that names one, or a recording in a published layout. For
+    /// the latter, also returns notes for people on what was assumed.
     ///
     /// # Errors
     /// See [`Recording::open`] and [`Imported::open`].
@@ -55,7 +55,7 @@ impl RecordedRobot {
         Ok((RecordedRobot::new(Recording::open(path)?), Vec::new()))
     }
 
-    /// A body at the recording's first station.
+    /// Creates a body at the recording's first station.
     pub fn new(recording: Recording) -> RecordedRobot {
         let frames = recording.frames.iter().map(|f| (f.name.clone(), f.world_from_camera)).collect();
         let coloured = recording.frames.iter().any(|f| f.colour.is_some());
@@ -63,7 +63,7 @@ impl RecordedRobot {
         Self::of(known, recording.start, Box::new(recording))
     }
 
-    /// A body at the first frame of a recording in a published layout.
+    /// Creates a body at the first frame of a recording in a published layout.
     pub fn imported(imported: Imported) -> RecordedRobot {
         let frames = imported.frames.iter().map(|f| (f.name.clone(), f.world_from_camera)).collect();
         let coloured = imported.coloured();
@@ -71,8 +71,8 @@ impl RecordedRobot {
         Self::of(known, 0, Box::new(imported))
     }
 
-    /// A body with recorded frames, starting at the station with index `start`. There must be at least one
-    /// station; head, arm and map of `known` are ignored.
+    /// Creates a body that has recorded frames and starts at the station with index `start`. There must be at
+    /// least one station; head, arm and map of `known` are ignored.
     pub fn of(known: Known, start: usize, frames: Box<dyn Footage>) -> RecordedRobot {
         let description =
             Description { head: None, arm: None, laser: None, senses: Vec::new(), ..known.description };
@@ -105,7 +105,7 @@ impl RecordedRobot {
         Err(Failure::Unreachable { because })
     }
 
-    /// Cost of a straight drive at constant speed while turning: max(ds/v, dθ/ω).
+    /// Cost of a straight drive between two stations, by index: max(ds/v, dθ/ω) seconds.
     fn cost(&self, from: usize, to: usize) -> Travel {
         let (a, b) = (&self.stations[from].map_from_base, &self.stations[to].map_from_base);
         let distance_m = (a.translation.vector - b.translation.vector).norm();
@@ -142,14 +142,14 @@ impl RecordedRobot {
     }
 }
 
-/// True if the folder is in a published layout and has none of our own files (settings, camera,
-/// pose).
+/// True if the folder is in a published layout and has none of the files of descry's own layouts (settings,
+/// camera, poses).
 fn is_foreign(path: &Path) -> bool {
     let ours = [SETTINGS_FILE, CAMERA_FILE, "pose.txt"];
     !ours.iter().any(|file| path.join(file).is_file()) && layout_of(path).is_some()
 }
 
-/// Facts about a body that stands where frames were taken.
+/// Description and stations of a body that stands where the frames were taken.
 fn known(
     name: &str,
     intrinsics: Intrinsics,

@@ -36,14 +36,14 @@ pub struct Settings {
     pub angular_deg_s: f64,
     /// Minimum and maximum depth of the camera, metres.
     pub range_m: [f64; 2],
-    /// The camera.
+    /// Depth camera; that of `camera-intrinsics.txt` if left out.
     pub camera: Option<CameraSettings>,
     /// Surfaces at known positions in the world of the poses, where z is up.
     #[serde(rename = "surface")]
     pub surfaces: Vec<SurfaceSettings>,
 }
 
-/// A known surface, which gets its name by its position.
+/// A surface at a known position, with its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSettings {
@@ -51,7 +51,7 @@ pub struct SurfaceSettings {
     pub name: String,
     /// Corners in order around it, along the world's x and y, metres.
     pub outline_m: Vec<[f64; 2]>,
-    /// Height of its top, along the world's z, metres.
+    /// Height of the top along the world's z, metres.
     pub height_m: f64,
 }
 
@@ -176,13 +176,13 @@ impl CameraSettings {
         Ok(())
     }
 
-    /// The camera for images of a size, columns and rows.
+    /// Intrinsics of the camera for images of a size, columns and rows.
     pub(crate) fn with_size(&self, (width, height): (usize, usize)) -> Intrinsics {
         Intrinsics { width, height, fx: self.fx, fy: self.fy, cx: self.cx, cy: self.cy }
     }
 
-    /// The axis along which the principal point lies outside an image of this size, with a description; none
-    /// if it is inside.
+    /// Axis (0 for x, 1 for y) along which the principal point lies outside an image of this size, columns
+    /// and rows, with a description; `None` if it is inside.
     pub(crate) fn off_image(&self, size: (usize, usize)) -> Option<(usize, String)> {
         let axes = [("cx", self.cx, size.0, "columns"), ("cy", self.cy, size.1, "rows")];
         let off = axes.into_iter().position(|(_, at, most, _)| !(0.0..=most as f64).contains(&at))?;

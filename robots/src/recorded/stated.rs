@@ -1,4 +1,4 @@
-//! Recording as stated by the files of its layout.
+//! Recording as its files state it, before units and conventions are resolved.
 
 use crate::input::InputError;
 use crate::recorded::picture::{self, RawDepth};
@@ -8,10 +8,10 @@ use image::RgbImage;
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
 
-/// Frames from which pairs of views are sought. From: chosen.
+/// Maximum number of frames for each of which a second view is sought. From: chosen.
 const ANCHORS: usize = 24;
 
-/// User's choices about what a folder does not state.
+/// Facts that the user gives because a folder does not state them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Asked {
     /// Name of the layout.
@@ -22,7 +22,7 @@ pub struct Asked {
     pub topic: Option<String>,
 }
 
-/// Frame as stated by its layout.
+/// Frame as its files state it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StatedFrame {
     /// Name, for the station.
@@ -33,15 +33,15 @@ pub struct StatedFrame {
     pub pose: Isometry3<f64>,
 }
 
-/// Recording as stated by its layout.
+/// Recording as its files state it.
 pub struct Stated {
-    /// Frames whose pose is known, in their order.
+    /// Frames whose pose is known, in the order of the recording.
     pub frames: Vec<StatedFrame>,
     /// Images of these frames.
     pub images: Box<dyn Images>,
-    /// Units and conventions of the layout.
+    /// Units and conventions that the layout defines.
     pub reading: Conventions,
-    /// True if depths are whole numbers of 16 bits.
+    /// True if depths are 16-bit integers.
     pub whole: bool,
     /// True if pixels of colour and depth are the same.
     pub registered: bool,
@@ -65,7 +65,7 @@ pub trait Images: Send + Sync {
     /// If it cannot be read.
     fn colour(&self, frame: usize) -> Result<Option<RgbImage>, InputError>;
 
-    /// Files of a frame's depth and colour that may be copied as they are.
+    /// Paths of a frame's depth and colour image, if they are files that may be copied as they are.
     fn files(&self, _frame: usize) -> Option<(&Path, Option<&Path>)> {
         None
     }
@@ -97,7 +97,7 @@ impl Images for Files {
     }
 }
 
-/// Pairs of views that show the same from different places, spread over the recording.
+/// Pairs of views that show much of the same from different places, spread over the recording.
 pub(crate) fn pairs(stated: &Stated) -> Result<Vec<Pair>, InputError> {
     let view = |i: usize| -> Result<StatedView, InputError> {
         let frame = &stated.frames[i];

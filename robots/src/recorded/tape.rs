@@ -1,4 +1,4 @@
-//! Requests to a body and their answers, in order: sufficient to replay the run.
+//! Tape of a body: its requests and answers in order, sufficient to replay the run.
 
 use crate::body::{Door, Place, Robot, Room, Stamp, Station, SurfaceHint, Travel};
 use crate::failure::Failure;
@@ -11,26 +11,26 @@ use serde::{Deserialize, Serialize};
 /// Description and map of a body at the beginning of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
-    /// See [`Robot::description`].
+    /// Parts and abilities of the body: [`Robot::description`].
     pub description: Description,
-    /// See [`Robot::surfaces`].
+    /// Surfaces in the map: [`Robot::surfaces`].
     pub surfaces: Vec<SurfaceHint>,
-    /// See [`Robot::rooms`].
+    /// Rooms in the map: [`Robot::rooms`].
     #[serde(default)]
     pub rooms: Vec<Room>,
-    /// See [`Robot::doors`].
+    /// Doors in the map: [`Robot::doors`].
     #[serde(default)]
     pub doors: Vec<Door>,
-    /// See [`Robot::stations`].
+    /// The only places where the body can stand, if it has such: [`Robot::stations`].
     pub stations: Option<Vec<Station>>,
-    /// See [`Robot::map`].
+    /// Occupancy grid of the floor, if the body has a map: [`Robot::map`].
     pub map: Option<OccupancyGrid>,
-    /// See [`Robot::now_ns`].
+    /// Time on the body's clock: [`Robot::now_ns`], nanoseconds.
     pub now_ns: Stamp,
 }
 
 impl Known {
-    /// Description and map that a body states.
+    /// Copies the description and the map of a body.
     pub fn of(robot: &dyn Robot) -> Self {
         Known {
             description: robot.description().clone(),
@@ -48,21 +48,21 @@ impl Known {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Question {
-    /// [`Robot::travel`].
+    /// Predicted cost of drives: [`Robot::travel`].
     Travel {
         /// Start.
         from: Place,
         /// Destinations.
         to: Vec<Place>,
-        /// Doors that count as shut.
+        /// Names of the doors that count as shut.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         shut: Vec<String>,
     },
-    /// [`Robot::camera_at`].
+    /// Predicted pose of the camera: [`Robot::camera_at`].
     CameraAt {
-        /// Pose of the base.
+        /// Place of the base.
         place: Place,
-        /// Target of the head.
+        /// Point in the map towards which the head is turned; straight ahead if `None`.
         look_at: Option<Point3<f64>>,
     },
 }
@@ -71,27 +71,28 @@ pub enum Question {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reply {
-    /// To [`Question::Travel`].
+    /// Cost of the drive to each destination, for [`Question::Travel`].
     Travel(Vec<Result<Travel, Failure>>),
-    /// To [`Question::CameraAt`].
+    /// Pose of the camera in the map, for [`Question::CameraAt`].
     CameraAt(Result<Isometry3<f64>, Failure>),
 }
 
 /// A request with its answer, and the queries since the previous request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// New replies since the previous entry.
+    /// Queries since the previous entry with their replies, as far as the replies are new.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub replies: Vec<(Question, Reply)>,
-    /// The request and its answer; none at the end of a run.
+    /// The request and its answer; `None` at the end of a run.
     pub done: Option<(Request, Answer)>,
-    /// The body's clock after the answer.
+    /// Time on the body's clock after the answer, nanoseconds.
     pub now_ns: Stamp,
 }
 
 /// Storage for a body's answers.
 pub trait Tape: Send + Sync {
-    /// Stores an entry durably; for a frame, durability also needs its pixels, which come next.
+    /// Stores an entry durably. The entry of a camera frame may become durable only with the pixels, which
+    /// are stored next.
     ///
     /// # Errors
     /// The reason for which it cannot be stored.

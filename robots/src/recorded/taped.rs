@@ -25,47 +25,51 @@ pub struct TapedRobot {
     known: Known,
     live: Option<Arc<dyn Robot>>,
     tape: Arc<dyn Tape>,
-    /// Seconds of the body's clock for each second of replay; none: as fast as possible.
+    /// Seconds on the body's clock for each second of a replay; `None` replays as fast as possible.
     speed: Option<f64>,
     state: Mutex<State>,
 }
 
-/// Tolerance on the pose of a body that has not moved since the tape ended, beyond its localisation error.
+/// Maximum distance from the last pose of the tape at which a body counts as not moved, metres, beyond its
+/// localisation error.
 const SAME_PLACE_M: f64 = 0.05;
+/// Maximum angle from the last pose of the tape at which a body counts as not moved, radians, beyond its
+/// localisation error.
 const SAME_PLACE_RAD: f64 = 0.05;
 
 struct State {
     now_ns: Stamp,
     played: VecDeque<Entry>,
-    /// Replies by query (as JSON), as far as the tape has been read.
+    /// Replies to queries that were read from the tape or asked of the live body, by the query as JSON.
     replies: BTreeMap<String, Reply>,
-    /// New replies since the last answer.
+    /// Queries since the last answer whose replies are new to the tape.
     pending: Vec<(Question, Reply)>,
     ended: Option<String>,
-    /// Last stated pose of the base.
+    /// Last estimated pose of the base, in the map.
     at: Option<Isometry3<f64>>,
-    /// Target of the head, if nothing else has moved since.
+    /// Point in the map at which the head was last directed; `None` once another request may have moved the
+    /// body.
     gaze: Option<Point3<f64>>,
-    /// True if the live body was asked for its pose after the end of the tape.
+    /// True once the pose of the live body was compared with the end of the tape, or need not be.
     met: bool,
-    /// Lead of the run's clock over the live body's, nanoseconds.
+    /// Time by which the run's clock is ahead of the live body's, nanoseconds.
     ahead_ns: Stamp,
 }
 
 impl TapedRobot {
-    /// Starts a tape of a body's answers.
+    /// Records the answers of a live body on a new tape.
     pub fn begin(live: Arc<dyn Robot>, tape: Arc<dyn Tape>) -> Self {
         Self::go_on(live, tape, Vec::new())
     }
 
-    /// Resumes a run at the end of its tape. `live` stands where it stood at the start of the tape, or where
-    /// it is by now. In the latter case its clock is shifted to continue at the end of the tape, and if it is
-    /// not at the last pose of the tape, the first request fails with [`Failure::Lost`].
+    /// Resumes a run at the end of its tape. A body that begins again first repeats the requests on the tape.
+    /// Any other has its clock shifted to continue the tape; if it is not at the tape's last pose, its first
+    /// request (other than for the pose) fails with [`Failure::Lost`].
     pub fn go_on(live: Arc<dyn Robot>, tape: Arc<dyn Tape>, entries: Vec<Entry>) -> Self {
         Self::new(Known::of(&*live), Some(live), tape, entries)
     }
 
-    /// Replays a tape without a live body; it is broken at the end of the tape.
+    /// Replays a tape without a live body; requests beyond the end of the tape fail with [`Failure::Broken`].
     pub fn replay(known: Known, tape: Arc<dyn Tape>, entries: Vec<Entry>, speed: Option<f64>) -> Self {
         Self { speed, ..Self::new(known, None, tape, entries) }
     }
@@ -92,8 +96,8 @@ impl TapedRobot {
         &self.known
     }
 
-    /// Reason for which the replay stopped: the tape ends there, or differs from the requests. None
-    /// if it did not stop.
+    /// Reason for which the replay stopped: the tape ended, or held another request. `None` if it did not
+    /// stop.
     pub fn ended(&self) -> Option<String> {
         self.lock().ended.clone()
     }
@@ -124,7 +128,11 @@ impl TapedRobot {
         self.tape.keep(entry).map_err(|because| Failure::Broken { because })
     }
 
-    /// Next answer on the tape, if it matches this request.
+    /// Takes the next entry from the tape if it holds this request; `None` if the tape has ended and there is
+    /// a live body.
+    ///
+    /// # Errors
+    /// [`Failure::Broken`] if the tape holds another request, or has ended without a live body.
     fn next(&self, request: &Request) -> Result<Option<Entry>, Failure> {
         let mut state = self.lock();
         let on_tape = state.played.front().map(|entry| entry.done.clone());
@@ -150,7 +158,7 @@ impl TapedRobot {
         Err(self.end(because))
     }
 
-    /// Stops the replay; the tape stores where.
+    /// Stops the replay for a reason, and stores an entry without an answer on the tape.
     fn end(&self, because: String) -> Failure {
         let mut state = self.lock();
         let entry = Entry { replies: Vec::new(), done: None, now_ns: state.now_ns };
@@ -163,8 +171,8 @@ impl TapedRobot {
         Failure::Broken { because }
     }
 
-    /// Answers a request from the tape or, beyond its end, from the live body; either way the answer is
-    /// stored.
+    /// Answers a request from the tape or, after the end of the tape, from the live body; stores the answer
+    /// in either case.
     async fn ask(&self, request: Request, watch: &Watch<'_>) -> Result<(Answer, Option<Sensed>), Failure> {
         if watch.cancel.is_cancelled() {
             return Err(Failure::Cancelled { because: format!("it was asked to {request}") });
@@ -230,7 +238,8 @@ impl TapedRobot {
         Ok((Entry { replies, done, now_ns: live.now_ns() + ahead_ns }, sensed))
     }
 
-    /// Asks a live body, once, whether it is where the tape left it.
+    /// Checks, once, that the live body is at the last pose of the tape; also sets the lead of the run's
+    /// clock.
     async fn meet(&self, live: &dyn Robot) -> Result<Met, Failure> {
         if std::mem::replace(&mut self.lock().met, true) {
             return Ok(Met::Here);
@@ -249,7 +258,10 @@ impl TapedRobot {
         Ok(Met::Elsewhere(Failure::Lost { because }))
     }
 
-    /// Repeats a replayed request on a body that begins again.
+    /// Repeats a replayed request on a live body that begins again.
+    ///
+    /// # Errors
+    /// [`Failure::Broken`] if the clock of that body then differs from the tape.
     async fn follow(&self, request: &Request, entry: Entry, watch: &Watch<'_>) -> Result<Entry, Failure> {
         let Some(live) = self.live.as_ref().filter(|live| live.begins_again()) else { return Ok(entry) };
         request.ask(&**live, watch).await;
@@ -272,7 +284,8 @@ impl TapedRobot {
         }
     }
 
-    /// Answers a query from the live body if there is one, else from the tape.
+    /// Answers a query from the tape while a part of it is still to be replayed, or without a live body; else
+    /// from the live body. `None` if neither has a reply.
     fn reply(&self, question: Question, live: impl FnOnce(&dyn Robot) -> Reply) -> Option<Reply> {
         let mut state = self.lock();
         let key = serde_json::to_string(&question).unwrap_or_default();
@@ -297,7 +310,7 @@ impl TapedRobot {
 }
 
 impl State {
-    /// Reads the replies on the tape up to the next answer.
+    /// Reads the replies that the tape holds before its next answer.
     fn hear_replies(&mut self) {
         let Some(next) = self.played.front() else { return };
         for (question, reply) in &next.replies {
@@ -306,17 +319,18 @@ impl State {
     }
 }
 
-/// State of the live body at the end of the tape.
+/// Result of comparing the live body with the end of the tape.
 enum Met {
-    /// At the last pose of the tape, or checked earlier.
+    /// At the last pose of the tape, or compared before.
     Here,
-    /// At the last pose of the tape, whose last request was to look at this point.
+    /// At the last pose of the tape, at which the head was directed at this point in the map.
     Looking(Point3<f64>),
-    /// Elsewhere.
+    /// At another pose; the failure says how far away.
     Elsewhere(Failure),
 }
 
-/// Failure for an answer of the wrong kind: only a damaged record can hold one.
+/// Failure for an answer of an unexpected kind: the one that it holds, else [`Failure::Broken`], since only a
+/// damaged record holds an answer of the wrong kind.
 fn mixed_up<T>(answer: Answer) -> Result<T, Failure> {
     match answer {
         Answer::Failed(failure) => Err(failure),

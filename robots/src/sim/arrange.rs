@@ -1,4 +1,5 @@
-//! Arrangement of a scene by a seed: places without overlap, and a target with the requested occlusion.
+//! Arrangement of a scene by a seed: objects are placed without overlap, and the target with the requested
+//! occlusion.
 
 use crate::body::Pose2;
 use crate::head;
@@ -18,17 +19,18 @@ use nalgebra::{Isometry2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Maximum number of arrangements tried.
+/// Maximum number of arrangements of a scene that are tried.
 const ROUNDS: usize = 400;
 /// Maximum number of places tried for one object within an arrangement.
 const PLACES: usize = 60;
 /// Maximum number of places tried for the target among the others.
 const TARGET_PLACES: usize = 40;
-/// Stride of the pixels used to test visibility; final shares use all pixels.
+/// Stride in columns and rows of the pixels that are used for first tests of visibility.
 const COARSE_STRIDE: usize = 3;
-/// Poses used to test whether some view shows the target: on a ring around its surface's centre, in the
-/// middle of the published 1.2 to 1.6 m.
+/// Radius of the ring of test poses around the centre of the target's surface, metres: in the middle of the
+/// published 1.2 to 1.6 m.
 const RING_M: f64 = 1.4;
+/// Number of test poses on the ring.
 const RING_POSES: usize = 16;
 
 /// Draws everything that the scene leaves open. The same seed gives the same scene.
@@ -89,7 +91,8 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
     Err(failures.report(spec, seed))
 }
 
-/// Places the obstacles on the floor, with random draws of their own, as for doors.
+/// Places the obstacles on the floor. Their random numbers are drawn separately, so that obstacles do not
+/// change other draws.
 fn stand_on_floor(spec: &SceneSpec, seed: u64) -> Result<Vec<ObstacleSpec>, InputError> {
     let mut rng = ChaCha8Rng::seed_from_u64(mix(seed ^ 0xf100));
     let outline = |o: &ObstacleSpec| Outline::Rectangle { half_m: [0.5 * o.size_m[0], 0.5 * o.size_m[1]] };
@@ -126,8 +129,8 @@ fn stand_on_floor(spec: &SceneSpec, seed: u64) -> Result<Vec<ObstacleSpec>, Inpu
     ))
 }
 
-/// Draws the state of each door, with random draws of its own, so that arrangements do not depend on the
-/// number of doors.
+/// Draws the state of each door. Its random numbers are drawn separately, so that arrangements do not depend
+/// on the number of doors.
 fn hang_doors(spec: &SceneSpec, seed: u64) -> Vec<HungDoor> {
     let hang = |(i, door): (usize, &DoorSpec)| {
         let drawn = mix(mix(seed ^ 0xd00f) ^ i as u64);
@@ -187,8 +190,8 @@ impl Failures {
     }
 }
 
-/// Places the objects for the requested visit: an object that arrives or moves is placed among the present
-/// ones, with random draws of its own, so that all others stay.
+/// Places the objects for the requested visit; `None` if an object finds no place. An object that arrives or
+/// moves is placed among the present ones with random numbers of its own, so that all others stay.
 fn visits(spec: &SceneSpec, seed: u64) -> Option<Vec<Object>> {
     let mut there: Vec<Option<Object>> = vec![None; spec.objects.len()];
     let mut asked = Vec::new();
@@ -247,7 +250,7 @@ fn place_all(spec: &SceneSpec, scene: &mut Scene, rng: &mut ChaCha8Rng) -> bool 
     true
 }
 
-/// Places an object on its surface among the others there; none if no place was found.
+/// Places an object on its surface, clear of the others there; `None` if no place is found.
 fn place<'a>(
     o: &ObjectSpec,
     shape: Shape,
@@ -273,7 +276,8 @@ fn place<'a>(
     found.then_some(object)
 }
 
-/// Draws for each object one of its possible surfaces by their weights; nothing is drawn for a single one.
+/// Draws for each object one of its possible surfaces by their weights, without a draw where only one is
+/// possible; `None` if an object has none.
 fn choose_surfaces<'a>(spec: &'a SceneSpec, rng: &mut ChaCha8Rng) -> Option<Vec<&'a SurfaceSpec>> {
     let mut chosen: Vec<&SurfaceSpec> = Vec::new();
     for o in &spec.objects {
@@ -284,7 +288,7 @@ fn choose_surfaces<'a>(spec: &'a SceneSpec, rng: &mut ChaCha8Rng) -> Option<Vec<
     Some(chosen)
 }
 
-/// Draws one of the possible surfaces of an object by their weights, except `taken`.
+/// Draws one of the possible surfaces of an object by their weights, except `taken`; `None` if there is none.
 fn choose_surface<'a>(
     spec: &'a SceneSpec,
     o: &ObjectSpec,
@@ -324,7 +328,7 @@ fn move_somewhere(o: &ObjectSpec, surface: &SurfaceSpec, object: &mut Object, rn
     object.map_from_object = surface.map_from_top() * upright(x, y, 0.0, yaw_rad);
 }
 
-/// True if the object lies completely on its surface and keeps its gap to the others.
+/// True if the object's outline lies completely on its surface and keeps the gap to the others.
 pub(crate) fn fits<'a>(
     object: &Object,
     surface: &SurfaceSpec,
@@ -338,7 +342,7 @@ pub(crate) fn fits<'a>(
     on_top && keeps_apart(object, others, gap_m)
 }
 
-/// True if the object keeps its gap to the others on the same surface.
+/// True if the object keeps the gap to the others on the same surface.
 pub(crate) fn keeps_apart<'a>(
     object: &Object,
     mut others: impl Iterator<Item = &'a Object>,
@@ -357,8 +361,8 @@ fn flat(map_from_object: &nalgebra::Isometry3<f64>) -> Isometry2<f64> {
     Isometry2::new(Vector2::new(pose.x_m, pose.y_m), pose.yaw_rad)
 }
 
-/// Moves the target among the others until it is occluded as requested; returns its share visible from the
-/// start.
+/// Moves the target among the others until it is occluded as requested; returns the share of it that is
+/// visible from the start, `None` if no try succeeds.
 fn settle_target(
     spec: &SceneSpec,
     target: &TargetSpec,

@@ -5,7 +5,7 @@ use crate::sim::laser::LaserModel;
 use descry_perception::Intrinsics;
 use nalgebra::{Point3, Vector3};
 
-/// The head.
+/// Head of the simulated body.
 pub const HEAD: Head = Head {
     base_from_head: Point3::new(0.0, 0.0, CAMERA_HEIGHT_M),
     pan_limit_rad: 2.6,
@@ -23,14 +23,14 @@ pub const HAND_OPENING_M: f64 = 0.12;
 pub const RADIUS_M: f64 = 0.25;
 /// Speeds of the base.
 pub const SPEEDS: Speeds = Speeds { linear_m_s: 0.4, angular_rad_s: 0.8 };
-/// Speed of the head.
+/// Turning speed of the head, radians a second.
 pub const HEAD_SPEED_RAD_S: f64 = 1.0;
 
 const FIELD_OF_VIEW_DEG: (f64, f64) = (57.0, 43.0);
 const IMAGE: (usize, usize) = (640, 480);
 const CAMERA_HEIGHT_M: f64 = 1.4;
 
-/// Camera of the published set-up: 640x480, 57° x 43°.
+/// Intrinsics of the camera in the published set-up: 640x480 pixels, 57° x 43°.
 pub fn intrinsics() -> Intrinsics {
     let (width, height) = IMAGE;
     let focal = |pixels: usize, field_deg: f64| 0.5 * pixels as f64 / (0.5 * field_deg.to_radians()).tan();
@@ -44,7 +44,7 @@ pub fn intrinsics() -> Intrinsics {
     }
 }
 
-/// Camera with its range.
+/// Description of the camera, with its range.
 pub fn camera() -> Camera {
     Camera {
         frame: "camera".into(),

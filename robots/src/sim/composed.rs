@@ -1,4 +1,4 @@
-//! Objects composed of several solids, painted with patterns: household objects besides cups and boxes.
+//! Objects composed of several solids, painted with patterns: household objects other than cups and boxes.
 
 use crate::sim::shape::{Primitive, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -18,18 +18,18 @@ pub struct Composed {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Piece {
-    /// Its solid, with the origin at the centre of its base.
+    /// Shape of the piece, with the origin at the centre of its base.
     pub shape: Shape,
-    /// Position of that origin in the object, metres.
+    /// Position of the shape's origin in the frame of the object, metres.
     #[serde(default)]
     pub at_m: [f64; 3],
-    /// Rotation about the object's x, then y, then z axis, degrees.
+    /// Rotation of the shape about the object's x, then y, then z axis, degrees.
     #[serde(default)]
     pub turn_deg: [f64; 3],
     /// Red, green, blue; the colour of the object if left out.
     #[serde(default)]
     pub colour: Option<[u8; 3]>,
-    /// Printed pattern.
+    /// Printed pattern; plain if left out.
     #[serde(default)]
     pub pattern: Option<Pattern>,
 }
@@ -38,16 +38,16 @@ pub struct Piece {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pattern {
-    /// Side of the larger patches, metres; the smaller ones within them have two fifths of it.
+    /// Side of the larger patches, metres; the sides of the smaller ones are two fifths of that.
     pub size_m: f64,
-    /// Maximum deviation of red, green and blue.
+    /// Scale of the deviation of red, green and blue from the base colour, of 255.
     pub spread: f64,
     /// Seed of the pattern.
     #[serde(default)]
     pub seed: u64,
 }
 
-/// The colours of a part.
+/// Colour and pattern of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Paint {
     /// Red, green, blue.
@@ -56,14 +56,14 @@ pub struct Paint {
     pub pattern: Option<Pattern>,
 }
 
-/// Weights of larger and smaller patches in the colour deviation; and the side of the smaller ones relative
-/// to the larger.
+/// Weight of the larger patches in the deviation from the base colour.
 const LARGER: f64 = 0.7;
+/// Side of the smaller patches, relative to the larger ones.
 const SMALLER: f64 = 0.5;
 const SMALLER_SIDE: f64 = 0.4;
 
 impl Paint {
-    /// The colour at a point in the solid's frame.
+    /// Colour at a point in the frame of the solid.
     pub fn at(&self, p: &Point3<f64>) -> [u8; 3] {
         let Some(pattern) = self.pattern else { return self.colour };
         let larger = patch(p, pattern.size_m, pattern.seed);
@@ -75,7 +75,7 @@ impl Paint {
     }
 }
 
-/// Three random values from -1 to 1 for the cube around a point.
+/// Three random values from -1 to 1 that are equal for all points in one cube of side `size_m`.
 fn patch(p: &Point3<f64>, size_m: f64, seed: u64) -> [f64; 3] {
     let cell = |key: u64, c: f64| super::noise::mix(key ^ ((c / size_m + 0.37).floor() as i64 as u64));
     let key = p.iter().fold(super::noise::mix(seed), |key, c| cell(key, *c));
@@ -91,7 +91,7 @@ impl Piece {
         )
     }
 
-    /// Corners of its bounding box in the object's frame.
+    /// Minimum and maximum corner of the bounding box in the object's frame, metres.
     fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         let thing_from_piece = self.thing_from_piece();
         let (low, high) = self.shape.bounds();
@@ -108,13 +108,13 @@ impl Piece {
 }
 
 impl Composed {
-    /// Corners of its bounding box.
+    /// Minimum and maximum corner of the bounding box in the object's frame, metres.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         let all = self.parts.iter().map(Piece::bounds);
         all.reduce(|(low, high), (l, h)| (low.inf(&l), high.sup(&h))).unwrap_or_default()
     }
 
-    /// Maximum distance from its axis, metres.
+    /// Radius of a cylinder around the object's z axis that contains the object, metres.
     pub fn radius_m(&self) -> f64 {
         let reach = |(low, high): (Point3<f64>, Point3<f64>)| {
             low.x.abs().max(high.x.abs()).hypot(low.y.abs().max(high.y.abs()))
@@ -122,7 +122,7 @@ impl Composed {
         self.parts.iter().map(|piece| reach(piece.bounds())).fold(0.0, f64::max)
     }
 
-    /// The object scaled by a factor.
+    /// Copies the object, scaled by a factor.
     pub fn scaled(&self, factor: f64) -> Composed {
         let piece = |p: &Piece| Piece {
             shape: p.shape.scaled(factor),
@@ -132,7 +132,7 @@ impl Composed {
         Composed { parts: self.parts.iter().map(piece).collect() }
     }
 
-    /// The surfaces for ray casting, with their colours; `colour` is for pieces without one.
+    /// Surfaces for ray casting, with their colours; `colour` is for pieces without one.
     pub fn painted(&self, colour: [u8; 3]) -> Vec<(Primitive, Paint)> {
         let of = |piece: &Piece| -> Vec<(Primitive, Paint)> {
             let own = piece.colour.unwrap_or(colour);
@@ -151,12 +151,12 @@ impl Composed {
 pub static HOUSEHOLD: LazyLock<BTreeMap<String, Composed>> =
     LazyLock::new(|| toml::from_str(include_str!("household.toml")).unwrap_or_default());
 
-/// The names of the household objects.
+/// Names of the household objects.
 pub fn household() -> impl Iterator<Item = &'static str> {
     HOUSEHOLD.keys().map(String::as_str)
 }
 
-/// The household object of this name.
+/// Household object of this name, if there is one.
 pub(crate) fn named(name: &str) -> Option<&'static Composed> {
     HOUSEHOLD.get(name)
 }

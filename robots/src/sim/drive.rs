@@ -10,14 +10,14 @@ use rand_distr::{Distribution, StandardNormal};
 /// Length of the steps of a straight drive, metres; the base can be stopped between two.
 const STEP_M: f64 = 0.05;
 
-/// One step of a drive.
+/// One step of a drive: a turn on the spot, or a part of a straight line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveStep {
-    /// Pose of the base afterwards.
+    /// Estimated pose of the base after the step.
     pub pose: Pose2,
-    /// Duration, seconds.
+    /// Duration of the step, seconds.
     pub seconds: f64,
-    /// Distance, metres.
+    /// Distance driven in the step, metres.
     pub metres: f64,
 }
 
@@ -60,10 +60,10 @@ pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<
 pub struct Localisation {
     /// Standard deviation of the estimate along x and y, metres.
     pub sigma_m: f64,
-    /// Standard deviation of its heading, radians.
+    /// Standard deviation of the estimated heading, radians.
     pub sigma_rad: f64,
-    /// Standard deviation of the stopping position relative to the goal, along x and y, metres. The estimate
-    /// includes it.
+    /// Standard deviation of the stopping position relative to the goal, along x and y, metres. The estimated
+    /// pose includes this deviation.
     pub stop_sigma_m: f64,
     /// Standard deviation of the heading at a stop, radians.
     pub stop_sigma_rad: f64,

@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 pub enum FaultKind {
     /// A person stands in the way: the drive ends early.
     BlockedPath,
-    /// The goal cannot be reached, now or later, although the map shows a route.
+    /// The goal of the drive cannot be reached, now or later, although the map shows a route.
     UnreachablePose,
     /// The drive uses up its time limit and ends early.
     TimedOutDrive,
@@ -74,7 +74,7 @@ impl FaultKind {
     ];
 }
 
-/// A fault: its kind, time and object.
+/// A fault: its kind, its time or probability, and the object, surface or door concerned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
@@ -83,19 +83,19 @@ pub struct Fault {
     /// Number of the drive (or frame, or grasp) at which it happens, from 1.
     #[serde(default)]
     pub at: Option<u64>,
-    /// Or the probability at each.
+    /// Probability of the fault at each drive (or frame, or grasp), in place of a number.
     #[serde(default)]
     pub chance: Option<f64>,
-    /// The object to move or take; drawn by the seed if left out.
+    /// Name of the object to move or take; drawn by the seed if left out.
     #[serde(default)]
     pub object: Option<String>,
-    /// The surface to put it on; drawn by the seed if left out.
+    /// Name of the surface to put the object on; drawn by the seed if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to: Option<String>,
-    /// The door to shut; drawn by the seed if left out.
+    /// Name of the door to shut; drawn by the seed if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub door: Option<String>,
-    /// Distance of the move, metres.
+    /// Distance by which the object is moved, metres.
     #[serde(default = "default_by_m")]
     pub by_m: f64,
 }
@@ -124,7 +124,7 @@ impl FaultPlan {
         Ok(plan)
     }
 
-    /// Checks that every fault has a time.
+    /// Checks that every fault has a number or a probability that is valid.
     ///
     /// # Errors
     /// The first objection, with its path in the document.

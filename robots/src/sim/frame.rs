@@ -7,15 +7,15 @@ use image::RgbImage;
 /// Image of an ideal camera, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// The camera.
+    /// Intrinsics of the camera.
     pub intrinsics: Intrinsics,
-    /// Time stamp.
+    /// Time stamp, nanoseconds.
     pub stamp_ns: Stamp,
     /// Depth along z, metres; infinite without a hit.
     pub depth_m: Vec<f32>,
-    /// Cosine of the angle between the ray and the surface's normal.
+    /// Cosine of the angle between each pixel's ray and the normal of the surface that it hits.
     pub cosine: Vec<f32>,
-    /// Label of the surface hit, as in [`world`](crate::sim::world).
+    /// Label of the surface that each pixel's ray hits, as in [`world`](crate::sim::world).
     pub label: Vec<u16>,
     /// Red, green, blue, shaded.
     pub colour: Vec<[u8; 3]>,

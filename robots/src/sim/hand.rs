@@ -1,4 +1,4 @@
-//! Grasping and placing of objects.
+//! Grasping and placing of objects by the simulated hand.
 
 use crate::sim::arrange::{fits, keeps_apart};
 use crate::sim::drive::normal;
@@ -34,15 +34,16 @@ pub(crate) const BASE_FROM_HAND: Vector3<f64> = Vector3::new(0.35, 0.0, 0.9);
 pub(crate) enum Taken {
     /// No object there.
     Nothing,
-    /// The object is wider than the hand opens.
+    /// The object with this index is wider than the hand opens.
     TooWide(usize),
-    /// Object slipped and stands, perhaps slightly displaced.
+    /// The object with this index slipped; it stands, perhaps slightly displaced.
     Slid(usize),
-    /// The object is in the hand.
+    /// The object with this index is in the hand.
     Held(usize),
 }
 
-/// Grasps at a point of the map (true coordinates): the nearest object there of about the expected width.
+/// Grasps at a point of the map (true coordinates, metres): takes the object there that is nearest in
+/// position and width.
 pub(crate) fn take(
     scene: &mut Scene,
     at: &Point3<f64>,
@@ -90,17 +91,18 @@ fn slide(scene: &mut Scene, object: usize, rng: &mut ChaCha8Rng) {
 /// Reason for which an object cannot be placed.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum NoPlace {
-    /// No such surface.
+    /// No surface is at that place and height.
     NoSurface,
-    /// The surface ends too close.
+    /// The object is too large for the surface of this name.
     Edge(String),
-    /// Another surface is too low above.
+    /// Another surface is too low above the surface of this name.
     Under(String),
     /// Another object is in the way.
     Taken,
 }
 
-/// Places an object near a point of the map (true coordinates); returns the surface's name.
+/// Places the object with this index near a point of the map (true coordinates, metres); returns the
+/// surface's name.
 pub(crate) fn put(
     scene: &mut Scene,
     object: usize,
@@ -143,7 +145,7 @@ pub(crate) fn put(
     Ok(name)
 }
 
-/// Pose of an object in the hand.
+/// Pose in the map of an object held by a base at `map_from_base`.
 pub(crate) fn map_from_held(map_from_base: &Isometry3<f64>) -> Isometry3<f64> {
     map_from_base * Translation3::from(BASE_FROM_HAND)
 }

@@ -15,19 +15,19 @@ use rand::Rng;
 const PUSH_S: f64 = 8.0;
 /// Speed of the hand while it pushes, metres a second.
 const HAND_M_S: f64 = 0.1;
-/// Share of the requested distance below which the hand reports a slip.
+/// Share of the requested distance below which a push that ends early is reported as slipped.
 const SLIPPED_SHARE: f64 = 0.5;
 /// Duration of a grasp, from the first move of the arm until the object is lifted, seconds.
 const GRASP_S: f64 = 12.0;
 /// Duration of a placement, from the first move of the arm until the hand is withdrawn, seconds.
 const PLACE_S: f64 = 10.0;
-/// Opening a door, seconds.
+/// Duration of opening a door, seconds.
 const DOOR_S: f64 = 6.0;
 /// Maximum distance of the base from the centre of a door to open it, metres.
 const DOOR_REACH_M: f64 = 1.2;
 /// Probability that the hand slips off a door.
 const DOOR_SLIP_CHANCE: f64 = 0.08;
-/// Interval at which the arm can be stopped, seconds.
+/// Time between two moments at which the arm can be stopped, seconds.
 const WORK_STEP_S: f64 = 0.5;
 
 fn unreachable(because: impl Into<String>) -> Failure {
@@ -95,7 +95,7 @@ impl SimRobot {
         }
     }
 
-    /// Lets the arm work for a duration, unless it is stopped.
+    /// Lets the arm work for a duration in seconds, unless the request is cancelled or its time limit passes.
     async fn work(&self, what: &str, seconds: f64, watch: &Watch<'_>) -> Result<(), Failure> {
         let mut elapsed_s = 0.0;
         while elapsed_s < seconds {

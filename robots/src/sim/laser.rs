@@ -13,19 +13,19 @@ use rand_distr::{Distribution, StandardNormal};
 /// A laser that sweeps in a horizontal plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaserModel {
-    /// Angle of the first reading, anticlockwise from straight ahead.
+    /// Angle of the first reading, anticlockwise from straight ahead, radians.
     pub first_rad: f64,
-    /// Angle from one reading to the next.
+    /// Angle from one reading to the next, radians.
     pub step_rad: f64,
-    /// Readings in a sweep.
+    /// Number of readings in a sweep.
     pub readings: usize,
-    /// Height of the plane above the floor.
+    /// Height of the plane above the floor, metres.
     pub height_m: f64,
-    /// Maximum range.
+    /// Maximum range, metres.
     pub reach_m: f64,
-    /// Standard deviation of a range.
+    /// Standard deviation of a range, metres.
     pub sigma_m: f64,
-    /// Resolution of ranges; 0 for exact ones.
+    /// Resolution of ranges, metres; 0 for exact ones.
     pub precision_m: f64,
 }
 
@@ -58,8 +58,8 @@ impl LaserModel {
     }
 }
 
-/// Simulates a sweep of a laser at `map_from_laser`, with the stated pose. Infinite ranges: no
-/// return.
+/// Simulates a sweep of a laser whose true pose is `map_from_laser`; the scan carries the pose `stated`.
+/// Readings without a return are infinite.
 pub fn sweep(
     scene: &Scene,
     laser: &LaserModel,
@@ -96,7 +96,8 @@ fn told(laser: &LaserModel, exact_m: f64, noise: f64) -> f64 {
     steps.max(laser.precision_m)
 }
 
-/// Solids that intersect the plane, with the transform from the map into their own frames.
+/// Solids that intersect the horizontal plane at a height, with the transform from the map into their own
+/// frames.
 fn crossing(scene: &Scene, height_m: f64) -> Vec<(Isometry3<f64>, Solid)> {
     scene
         .solids()
@@ -110,7 +111,7 @@ fn crossing(scene: &Scene, height_m: f64) -> Vec<(Isometry3<f64>, Solid)> {
         .collect()
 }
 
-/// Range of a horizontal ray; infinite without a hit.
+/// Range of a horizontal ray from `eye`, metres; infinite without a hit.
 fn nearest_m(
     room: &RoomSpec,
     solids: &[(Isometry3<f64>, Solid)],
@@ -125,7 +126,7 @@ fn nearest_m(
     })
 }
 
-/// Range to the outer walls from inside.
+/// Range from inside the room to its outer walls, metres; infinite from outside.
 fn wall_m(room: &RoomSpec, eye: &Point3<f64>, along: &Vector3<f64>) -> f64 {
     let (low, high) = (room.low(), room.high());
     let to = |axis: usize| match along[axis] {

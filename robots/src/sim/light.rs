@@ -6,20 +6,21 @@ use crate::sim::frame::Frame;
 use crate::sim::noise::{mix, normal, share};
 use serde::{Deserialize, Serialize};
 
-/// Light of a scene, drawn by the seed. Without one, colours are as stated, but shaded.
+/// Light of a scene, drawn by the seed. Without it, surfaces have the stated colours, shaded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Light {
-    /// Least and greatest brightness; 1 shows colours as stated where light falls straight.
+    /// Minimum and maximum brightness; 1 shows the stated colours where light falls straight on a surface.
     #[serde(default = "default_gain")]
     pub gain: (f64, f64),
-    /// Standard deviation of the logarithm of the gains of red and of blue beside green: lamps, and a white balance that errs.
+    /// Standard deviation of the logarithm of the gains of red and of blue relative to green: colour of
+    /// lamps, errors of the white balance.
     #[serde(default)]
     pub cast: f64,
-    /// Greatest share of white in a highlight, where a surface faces the camera.
+    /// Maximum share of white in a highlight, 0 to 1, reached where a surface faces the camera.
     #[serde(default)]
     pub gloss: f64,
-    /// Standard deviation of each channel of each pixel, of 255.
+    /// Standard deviation of the noise of each channel of each pixel, of 255.
     #[serde(default)]
     pub noise: f64,
 }
@@ -28,7 +29,7 @@ fn default_gain() -> (f64, f64) {
     (1.0, 1.0)
 }
 
-/// Exponent of the cosine between ray and surface in a highlight: its width.
+/// Exponent of the cosine between ray and surface normal in a highlight, which sets its width.
 const SHININESS: i32 = 40;
 
 impl Light {
@@ -51,12 +52,12 @@ impl Light {
     }
 }
 
-/// Linear light of a channel of sRGB, 0 to 1 (IEC 61966-2-1).
+/// Converts a channel of sRGB to linear light, both 0 to 1 (IEC 61966-2-1).
 fn linear(c: f64) -> f64 {
     if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Channel of sRGB of linear light, 0 to 1.
+/// Converts linear light to a channel of sRGB, both 0 to 1.
 fn curved(c: f64) -> f64 {
     if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
 }

@@ -16,9 +16,9 @@ pub struct DepthNoise {
     pub disparity_steps: f64,
     /// Share of pixels lost beside a depth edge.
     pub edge_loss: f64,
-    /// Factor on both standard deviations; 0 leaves quantisation and lost pixels.
+    /// Factor on both standard deviations of the depth noise; 0 leaves quantisation and lost pixels.
     pub scale: f64,
-    /// Share of the returns lost in patches, at steep faces and depth edges first.
+    /// Share of the returns that are lost in patches, at steep faces and depth edges first.
     pub holes: f64,
 }
 
@@ -31,12 +31,12 @@ impl Default for DepthNoise {
 
 /// Incidence angle beyond which nothing returns, degrees.
 const STEEPEST_DEG: f64 = 85.0;
-/// Relative depth difference of neighbouring pixels from which there is an edge.
+/// Relative depth difference of neighbouring pixels from which there is a depth edge.
 const EDGE_SHARE: f32 = 0.02;
 /// Size of the patches of lost returns, pixels.
 const PATCH_PX: usize = 10;
 
-/// θ/(90° − θ) by cosine of θ; infinite beyond `STEEPEST_DEG`.
+/// θ/(90° − θ) for the incidence angle θ with this cosine; infinite beyond `STEEPEST_DEG`.
 fn steepness(cosine: f32) -> f32 {
     const CELLS: usize = 2048;
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
@@ -127,8 +127,8 @@ pub fn observe(
     out
 }
 
-/// Removes a share of the returns: those with the greatest sum of a random field smooth over `PATCH_PX`, of
-/// steepness, and of a bonus for depth edges.
+/// Removes a share of the returns: those with the greatest sum of a random field smooth over `PATCH_PX`, the
+/// steepness of the surface, and a bonus at depth edges.
 fn lose_patches(frame: &Frame, holes: f64, key: u64, depths_m: &mut [f32]) {
     let width = frame.intrinsics.width.max(1);
     let corner = |column: usize, row: usize| normal(mix(mix(key ^ (column as u64) << 32) ^ row as u64));

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry2, Isometry3, Point2, Translation3, UnitQuaternion, Vector2, Vector3};
 
-/// Footprint for keeping two shapes apart on a table.
+/// Outline of an object on its surface, used for gaps between objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline {
     /// Disc around the origin.
@@ -10,14 +10,14 @@ pub enum Outline {
         /// Radius, metres.
         radius_m: f64,
     },
-    /// Axis-aligned rectangle around the origin.
+    /// Rectangle around the origin, aligned with the axes.
     Rectangle {
         /// Half the sides, metres.
         half_m: [f64; 2],
     },
 }
 
-/// Upright pose at a point of the map.
+/// Upright pose in the map with the origin at a point.
 pub(crate) fn upright(x_m: f64, y_m: f64, z_m: f64, yaw_rad: f64) -> Isometry3<f64> {
     Isometry3::from_parts(
         Translation3::new(x_m, y_m, z_m),
@@ -25,7 +25,8 @@ pub(crate) fn upright(x_m: f64, y_m: f64, z_m: f64, yaw_rad: f64) -> Isometry3<f
     )
 }
 
-/// Discs whose hull is the outline: four corners of radius zero, or one disc.
+/// Discs whose convex hull is the outline, as centre in the map and radius in metres: four corners of radius
+/// zero, or one disc.
 pub(crate) fn corners(outline: &Outline, at: &Isometry2<f64>) -> Vec<(Point2<f64>, f64)> {
     match *outline {
         Outline::Disc { radius_m } => vec![(at * Point2::origin(), radius_m)],
@@ -35,8 +36,8 @@ pub(crate) fn corners(outline: &Outline, at: &Isometry2<f64>) -> Vec<(Point2<f64
     }
 }
 
-/// Gap between two outlines, metres; zero or negative where they overlap. For two boxes, a lower bound by
-/// separating axes.
+/// Gap between two outlines, metres; zero or negative where they overlap. For two rectangles, a lower bound
+/// by separating axes.
 pub(crate) fn gap_between(a: &Outline, at_a: &Isometry2<f64>, b: &Outline, at_b: &Isometry2<f64>) -> f64 {
     match (a, b) {
         (Outline::Disc { radius_m: ra }, Outline::Disc { radius_m: rb }) => {

@@ -7,11 +7,11 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Probability that the hand slides off.
+/// Probability that the hand slides off the object.
 const SLIP_CHANCE: f64 = 0.08;
-/// Relative standard deviation of the distance.
+/// Standard deviation of the distance, relative to the requested one.
 const DISTANCE_SIGMA: f64 = 0.08;
-/// Standard deviation of the direction, radians.
+/// Standard deviation of the direction of the push, radians.
 const DIRECTION_SIGMA_RAD: f64 = 0.08;
 /// Standard deviation of the object's rotation, radians.
 const TURN_SIGMA_RAD: f64 = 0.15;
@@ -26,21 +26,21 @@ const STEP_M: f64 = 0.005;
 /// Effect of a push.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// There was no object.
+    /// No object on a surface is there.
     Nothing,
-    /// Object moved, until the distance was reached, an obstacle was felt, or the hand slid off.
+    /// The object moved until the distance was reached, an obstacle was felt, or the hand slid off.
     Moved {
         /// Index of the object.
         object: usize,
-        /// Distance, metres.
+        /// Distance that the object moved, metres.
         moved_m: f64,
-        /// Reason for a push shorter than requested.
+        /// Reason for which the push ended early, if it did.
         stopped: Option<&'static str>,
     },
 }
 
-/// Pushes the object at a point of the map (true coordinates). It stays on its surface and does not push
-/// others.
+/// Pushes the object at a point of the map (true coordinates, metres). The object stays on its surface and
+/// does not push others.
 pub fn push(
     scene: &mut Scene,
     at: &Point3<f64>,

@@ -11,14 +11,14 @@ use descry_perception::Intrinsics;
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
 
-/// A solid in the camera's frame.
+/// A solid, the camera's pose in the solid's frame, and the pixel rectangle that the solid may cover.
 struct Placed<'a> {
     solid: &'a Solid,
     origin: Point3<f64>,
     solid_from_camera: Rotation3<f64>,
     columns: (usize, usize),
     rows: (usize, usize),
-    /// Lower bound on its depth, metres.
+    /// Lower bound on the depth of the solid, metres.
     near_m: f64,
 }
 
@@ -27,7 +27,7 @@ const SLACK_M: f64 = 1e-6;
 /// Distance to the camera's plane below which a bounding box counts as covering the whole image, metres.
 const NEAR_M: f64 = 0.02;
 const FLOOR_COLOUR: [u8; 3] = [120, 115, 110];
-/// Direction to the lamp, map frame.
+/// Direction to the lamp, map frame, nearly a unit vector.
 const LIGHT: Vector3<f64> = Vector3::new(0.32, -0.24, 0.917);
 
 impl<'a> Placed<'a> {
@@ -72,7 +72,7 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// The ray through a pixel, depth 1, in the optical frame.
+/// Ray through a pixel in the optical frame, scaled to depth 1.
 #[inline]
 fn ray(camera: &Intrinsics, column: usize, row: usize) -> Vector3<f64> {
     Vector3::new((column as f64 - camera.cx) / camera.fx, (row as f64 - camera.cy) / camera.fy, 1.0)

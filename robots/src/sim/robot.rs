@@ -26,10 +26,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Time from the trigger to the frame, seconds.
+/// Time from the trigger to the camera frame, seconds.
 const FRAME_S: f64 = 0.1;
 
-/// Time from the trigger to the sweep, seconds.
+/// Time from the trigger to the laser sweep, seconds.
 const SWEEP_S: f64 = 0.03;
 
 /// Options of the simulator besides the scene.
@@ -61,15 +61,15 @@ pub struct SimRobot {
     state: Mutex<State>,
 }
 
-/// A drive as decided before the base moves.
+/// A planned drive, before the base moves.
 struct Departure {
     number: u64,
     steps: Vec<drive::DriveStep>,
-    /// Number of steps after which the drive ends early, and the reason.
+    /// Number of steps after which the drive ends early, and the reason; `None` if the base arrives.
     end: Option<(usize, End)>,
 }
 
-/// Result of a drive.
+/// Result of a drive: the last pose reached, time, distance, and the failure if the drive ended early.
 struct Trip {
     at: Option<Pose2>,
     elapsed_s: f64,
@@ -185,7 +185,7 @@ impl SimRobot {
         }
     }
 
-    /// The faults of a kind at a drive, frame or grasp.
+    /// Faults of a kind that happen at the drive, frame or grasp of this number.
     fn strike(&self, kind: FaultKind, number: u64) -> impl Iterator<Item = &Fault> {
         self.options.faults.strike(kind, number, self.options.seed)
     }
@@ -287,7 +287,8 @@ impl SimRobot {
         }
     }
 
-    /// Applies the faults during a drive: actions of others, and a dropped object.
+    /// Applies the faults that happen during a drive: actions of people on objects, and the loss of the held
+    /// object.
     fn disturb(&self, departure: &Departure, trip: &Trip) {
         for kind in [FaultKind::ObjectMoved, FaultKind::ObjectTaken, FaultKind::ObjectRelocated] {
             for fault in self.strike(kind, departure.number) {
@@ -318,7 +319,8 @@ impl SimRobot {
         Ok(Looked { duration_s, miss_rad })
     }
 
-    /// Triggers a frame or a sweep that is due after `seconds`; returns its number unless it is lost.
+    /// Triggers a camera frame or a laser sweep that is due after `seconds`; returns its number unless it is
+    /// lost.
     fn trigger(&self, state: &mut State, seconds: f64) -> Result<u64, Failure> {
         state.pass(seconds);
         state.frames += 1;

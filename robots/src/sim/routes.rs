@@ -12,10 +12,10 @@ use std::sync::Arc;
 /// Maximum number of cached routers; the cache is cleared beyond that.
 const MOST_ROUTERS: usize = 64;
 
-/// Set of doors, by index.
+/// Set of doors, by their indices in the scene.
 pub(crate) type Doors = BTreeSet<usize>;
 
-/// The body's own map with its routers.
+/// The body's own map, with a router for each set of shut doors.
 pub(crate) struct Routes {
     map: OccupancyGrid,
     doors: Vec<Doorway>,
@@ -25,12 +25,12 @@ pub(crate) struct Routes {
 }
 
 impl Routes {
-    /// Routes on a map for a base that needs `radius_m` of clearance.
+    /// Creates the routes on a map for a base that needs `radius_m` of clearance.
     pub fn new(map: OccupancyGrid, doors: Vec<Doorway>, radius_m: f64, speeds: Speeds) -> Routes {
         Routes { map, doors, radius_m, speeds, routers: BTreeMap::new() }
     }
 
-    /// The router with these doors as walls.
+    /// Router for the map with these doors closed.
     pub fn with_shut(&mut self, shut: &Doors) -> Arc<Router> {
         if let Some(router) = self.routers.get(shut) {
             return router.clone();
@@ -51,7 +51,7 @@ impl Routes {
         router
     }
 
-    /// Marks an area of the map as occupied.
+    /// Marks as occupied the cells of the map whose centres satisfy `inside`.
     pub fn occupy(&mut self, inside: impl Fn(&Point2<f64>) -> bool) {
         self.map.occupy(inside);
         self.routers.clear();

@@ -1,4 +1,5 @@
-//! Shapes of objects, and their ray intersections. Frame of a shape: origin at the centre of its base, z up.
+//! Shapes of objects, and their surfaces for ray casting. The frame of a shape has its origin at the centre
+//! of the base, z up.
 
 mod part;
 
@@ -25,9 +26,9 @@ pub enum Shape {
     Box(Cuboid),
     /// An axis-aligned ellipsoid.
     Ball(Ball),
-    /// An upright rod with rounded ends.
+    /// A vertical rod with rounded ends.
     Rod(Rod),
-    /// An upright half ring towards its x axis: a handle.
+    /// A vertical half ring towards its x axis: a handle.
     Bow(Bow),
     /// Several solids as one rigid object.
     Composed(Composed),
@@ -39,13 +40,13 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cup {
-    /// Diameter at the rim.
+    /// Diameter at the rim, metres.
     pub diameter_m: f64,
-    /// Diameter at the base; as at the rim if left out.
+    /// Diameter at the base, metres; as at the rim if left out.
     pub base_diameter_m: Option<f64>,
-    /// Height from base to rim.
+    /// Height from base to rim, metres.
     pub height_m: f64,
-    /// Thickness of wall and base.
+    /// Thickness of wall and base, metres.
     #[serde(default = "default_wall_m")]
     pub wall_m: f64,
 }
@@ -54,19 +55,19 @@ pub struct Cup {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mug {
-    /// Diameter at the rim.
+    /// Diameter at the rim, metres.
     pub diameter_m: f64,
-    /// Diameter at the base; as at the rim if left out.
+    /// Diameter at the base, metres; as at the rim if left out.
     pub base_diameter_m: Option<f64>,
-    /// Height from base to rim.
+    /// Height from base to rim, metres.
     pub height_m: f64,
-    /// Thickness of wall and base.
+    /// Thickness of wall and base, metres.
     #[serde(default = "default_wall_m")]
     pub wall_m: f64,
-    /// Reach of the handle from the wall: outer radius of the half ring.
+    /// Reach of the handle from the wall: outer radius of the half ring, metres.
     #[serde(default = "default_handle_m")]
     pub handle_m: f64,
-    /// Thickness of the handle.
+    /// Thickness of the handle, metres.
     #[serde(default = "default_handle_thickness_m")]
     pub handle_thickness_m: f64,
 }
@@ -75,11 +76,11 @@ pub struct Mug {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cylinder {
-    /// Diameter at the base.
+    /// Diameter at the base, metres.
     pub diameter_m: f64,
-    /// Diameter at the top; as at the base if left out.
+    /// Diameter at the top, metres; as at the base if left out.
     pub top_diameter_m: Option<f64>,
-    /// Height from base to top.
+    /// Height from base to top, metres.
     pub height_m: f64,
 }
 
@@ -87,13 +88,13 @@ pub struct Cylinder {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Canister {
-    /// Diameter of the body.
+    /// Diameter of the body, metres.
     pub diameter_m: f64,
-    /// Height from base to the top of the lid.
+    /// Height from base to the top of the lid, metres.
     pub height_m: f64,
-    /// Diameter of the lid.
+    /// Diameter of the lid, metres.
     pub lid_diameter_m: f64,
-    /// Height of the lid.
+    /// Height of the lid, metres.
     pub lid_height_m: f64,
 }
 
@@ -101,7 +102,7 @@ pub struct Canister {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cuboid {
-    /// Size along x, y and z.
+    /// Size along x, y and z, metres.
     pub size_m: [f64; 3],
 }
 
@@ -109,7 +110,7 @@ pub struct Cuboid {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ball {
-    /// Diameters along x, y and z.
+    /// Diameters along x, y and z, metres.
     pub size_m: [f64; 3],
 }
 
@@ -117,9 +118,9 @@ pub struct Ball {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rod {
-    /// Length from end to end.
+    /// Length from end to end, metres.
     pub length_m: f64,
-    /// Diameter.
+    /// Diameter, metres.
     pub diameter_m: f64,
 }
 
@@ -127,9 +128,9 @@ pub struct Rod {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bow {
-    /// Outer diameter of the ring, which is the height.
+    /// Outer diameter of the ring, which is the height, metres.
     pub height_m: f64,
-    /// Thickness of the bent rod.
+    /// Thickness of the bent rod, metres.
     pub thickness_m: f64,
 }
 
@@ -158,7 +159,7 @@ impl Shape {
         }
     }
 
-    /// Parts, if it is composed.
+    /// Composed object behind the shape, if it is one.
     fn composed(&self) -> Option<&Composed> {
         match self {
             Shape::Composed(composed) => Some(composed),
@@ -167,7 +168,7 @@ impl Shape {
         }
     }
 
-    /// Corners of its bounding box in its own frame.
+    /// Minimum and maximum corner of the bounding box in the shape's frame, metres.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         if let Some(composed) = self.composed() {
             return composed.bounds();
@@ -189,7 +190,7 @@ impl Shape {
         (Point3::new(-half_x, -half_y, 0.0), Point3::new(high_x.max(half_x), half_y, self.height_m()))
     }
 
-    /// Footprint on the table, over all heights.
+    /// Outline of the shape seen from above, over all heights.
     pub fn outline(&self) -> Outline {
         match self {
             Shape::Box(Cuboid { size_m }) => {
@@ -200,7 +201,7 @@ impl Shape {
         }
     }
 
-    /// Required opening of a hand around its body, without a handle, metres.
+    /// Opening of a hand that the shape's body requires, without a handle, metres.
     pub fn width_m(&self) -> f64 {
         match self {
             Shape::Ball(_) | Shape::Bow(_) | Shape::Composed(_) | Shape::Household(_) => {
@@ -212,7 +213,7 @@ impl Shape {
         }
     }
 
-    /// The shape scaled by a factor.
+    /// Copies the shape, scaled by a factor.
     pub fn scaled(&self, factor: f64) -> Shape {
         let mut shape = self.clone();
         match &mut shape {
@@ -271,7 +272,7 @@ impl Shape {
         0.5 * diameter
     }
 
-    /// The surfaces for ray casting, with their colours; `colour` is for those without one.
+    /// Surfaces for ray casting, with their colours; `colour` is for surfaces without one.
     pub fn painted(&self, colour: [u8; 3]) -> Vec<(Primitive, Paint)> {
         match self.composed() {
             Some(composed) => composed.painted(colour),
@@ -279,7 +280,7 @@ impl Shape {
         }
     }
 
-    /// The surfaces for ray casting.
+    /// Surfaces for ray casting.
     pub fn parts(&self) -> Vec<Primitive> {
         match self {
             Shape::Composed(_) | Shape::Household(_) => {
@@ -338,7 +339,7 @@ impl Shape {
     }
 }
 
-/// Distance of the handle's ring centre from the axis, metres: on the wall at half height.
+/// Distance of the centre of the handle's ring from the mug's axis, metres: on the wall at half height.
 fn handle_centre_m(m: &Mug) -> f64 {
     0.25 * (m.diameter_m + m.base_diameter_m.unwrap_or(m.diameter_m))
 }

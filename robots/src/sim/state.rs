@@ -18,24 +18,25 @@ use nalgebra::{Isometry3, Point2, Point3, Translation3, Vector2, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Range of the base's own safety scanner, metres.
+/// Range of the base's safety scanner, metres; obstacles beyond it are not added to the map.
 const SCANNER_M: f64 = 0.8;
-/// Range within which laser hits are added to the map, metres; hits close to a wall are left out.
+/// Range within which laser hits are added to the body's map, metres.
 const NOTICED_M: f64 = 2.5;
+/// Distance from a mapped wall or surface, metres, within which laser hits are not added.
 const NEAR_WALL_M: f64 = 0.2;
-/// Distance within which goals share the outcome of an unreachable one, metres.
+/// Distance from an unreachable goal within which other goals count as unreachable too, metres.
 const SAME_GOAL_M: f64 = 0.1;
-/// Number of directions tried for an object that someone moves.
+/// Maximum number of places tried for an object that someone moves.
 const MOVE_TRIES: usize = 40;
 
-/// The changing part of the simulator.
+/// State of the simulator that changes during a run.
 pub(crate) struct State {
     pub scene: Scene,
     pub now_ns: Stamp,
     pub events: Vec<Event>,
     pub rng: ChaCha8Rng,
     pub routes: Routes,
-    /// Doors that stopped the base and were not opened since, as far as the body knows.
+    /// Doors that stopped the base and were not opened since, as the body knows them.
     pub seen_shut: Doors,
     pub estimate: Pose2,
     /// `estimate = truth · error`: an error in the body's own frame.
@@ -45,11 +46,11 @@ pub(crate) struct State {
     pub frames: u64,
     pub grasps: u64,
     pub unreachable: Vec<Pose2>,
-    /// Obstacles missing in the base's map.
+    /// Obstacles that the body's map does not show.
     pub unknown: Vec<ObstacleSpec>,
 }
 
-/// Reason for which a drive ends early.
+/// Reason for which a drive ends early: a person, slipping wheels, an obstacle or a shut door (by index).
 pub(crate) enum End {
     Person,
     Stuck,
@@ -63,12 +64,12 @@ impl State {
         self.really(&self.estimate)
     }
 
-    /// True pose of the base when the stated one is `estimate`.
+    /// True pose of the base when the estimated one is `estimate`.
     fn really(&self, estimate: &Pose2) -> Isometry3<f64> {
         estimate.isometry() * self.error.inverse()
     }
 
-    /// `truth_from_estimate` for map points given by the body.
+    /// Transform from map points as the body states them to true map points.
     pub fn truth_from_estimate(&self) -> Isometry3<f64> {
         self.map_from_base() * self.estimate.isometry().inverse()
     }
@@ -87,7 +88,7 @@ impl State {
         self.events.push(Event { stamp_ns: self.now_ns, what: what.into() });
     }
 
-    /// Rejects a goal near an unreachable one.
+    /// Rejects a goal close to one that could not be reached.
     pub fn known_unreachable(&self, goal: &Pose2) -> Result<(), Failure> {
         let same = |tried: &&Pose2| (tried.point() - goal.point()).norm() <= SAME_GOAL_M;
         match self.unreachable.iter().find(same) {
@@ -98,9 +99,9 @@ impl State {
         }
     }
 
-    /// First step that brings the footprint into an unmapped obstacle, and the obstacle's index. A
-    /// touched obstacle stops only steps towards it, and no turns: a turn on the spot shifts the
-    /// modelled true position of a base with a wrong estimate, although the base does not move.
+    /// Index of the first step that brings the footprint into an unmapped obstacle, and the obstacle's index.
+    /// Only steps towards an obstacle count, and no turns: a turn on the spot shifts the modelled true
+    /// position of a base with a wrong estimate, although the base does not move.
     pub fn first_bump(&self, steps: &[drive::DriveStep], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.map_from_base().translation.vector.xy().into();
         for (i, step) in steps.iter().enumerate() {
@@ -117,12 +118,12 @@ impl State {
         None
     }
 
-    /// Object in the hand.
+    /// Index of the object in the hand, if any.
     pub fn held(&self) -> Option<usize> {
         self.scene.objects.iter().position(|o| o.stands == Stand::Hand)
     }
 
-    /// Index of the door of this name.
+    /// Index of the door of this name, if there is one.
     pub fn door(&self, name: &str) -> Option<usize> {
         self.scene.doors.iter().position(|d| d.doorway.name == name)
     }
@@ -147,8 +148,8 @@ impl State {
         }
     }
 
-    /// First step that brings the footprint into a shut door, and the door's index. The base
-    /// detects doors where its map has them, so the planned pose counts.
+    /// Index of the first step that brings the footprint into a shut door, and the door's index. The base
+    /// detects doors where its map has them, so the estimated pose counts.
     pub fn first_shut_door(&self, steps: &[drive::DriveStep], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.estimate.point();
         for (i, step) in steps.iter().enumerate() {
@@ -165,8 +166,8 @@ impl State {
         None
     }
 
-    /// Records what ended a drive: a shut door, or the scanned part of an obstacle on the body's own map,
-    /// placed by the estimated pose.
+    /// Records what ended a drive: a shut door, or the scanned part of an obstacle, which is drawn into the
+    /// body's map by the estimated pose.
     pub fn learn(&mut self, end: &End) {
         let obstacle = match end {
             End::Door(door) => {
@@ -184,7 +185,7 @@ impl State {
         });
     }
 
-    /// Adds nearby laser hits to the body's own map where the map of the room shows nothing.
+    /// Adds nearby laser hits to the body's map where `map` shows no obstacle.
     pub fn notice(&mut self, scan: &Scan, map: &OccupancyGrid) {
         let on_map = |p: &Point2<f64>| {
             (-1..=1).any(|i| {
@@ -203,7 +204,8 @@ impl State {
         }
     }
 
-    /// Stops at the intended pose; draws the stopping error and the error of the estimate.
+    /// Stops near the intended pose `wanted`: draws the stopping error and the error of the estimate, a large
+    /// one if `misled`.
     pub fn stop(&mut self, wanted: &Pose2, localisation: &Localisation, misled: bool) {
         self.estimate = localisation.stop(wanted, &mut self.rng);
         self.error = localisation.error(&mut self.rng);
@@ -213,7 +215,7 @@ impl State {
         }
     }
 
-    /// Lets someone take or move an object.
+    /// Lets someone take, relocate or move an object, as the fault says.
     pub fn disturb(&mut self, fault: &Fault) {
         let present: Vec<usize> =
             (0..self.scene.objects.len()).filter(|&i| self.scene.objects[i].is_in_place()).collect();
@@ -244,7 +246,8 @@ impl State {
         }
     }
 
-    /// Drops the held object to the floor at a point of the base's way.
+    /// Drops the held object to the floor where the base was at the estimated pose `on_the_way`; if `None`,
+    /// at the current place.
     pub fn drop_held(&mut self, on_the_way: Option<&Pose2>) {
         let Some(i) = self.held() else { return };
         let at = on_the_way.map_or(self.map_from_base(), |pose| self.really(pose)).translation;
@@ -273,7 +276,8 @@ impl State {
         self.note(format!("somebody shuts \"{}\"", self.scene.doors[i].doorway.name));
     }
 
-    /// Moves an object to a random place on another surface; returns the surface's name.
+    /// Moves an object to a random place on another surface, or on the one named `to`; returns the surface's
+    /// name, `None` without room.
     fn relocate_object(&mut self, i: usize, to: Option<&str>) -> Option<String> {
         let o = &self.scene.objects[i];
         let goes = |s: &&SurfaceSpec| {

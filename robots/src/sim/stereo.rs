@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// A stereo camera: σ_z = z²·σ_d/(f·b).
+/// A stereo camera with the depth noise σ_z = z²·σ_d/(f·b).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stereo {
@@ -30,12 +30,12 @@ fn default_range_m() -> (f64, f64) {
 
 /// Side of a textured or bare spot, metres.
 const SPOT_M: f64 = 0.15;
-/// Incidence angle beyond which nothing is matched: cosine of 85 degrees.
+/// Minimum cosine of the incidence angle at which a surface is matched: that of 85 degrees.
 const STEEPEST: f32 = 0.087;
 
 impl Stereo {
-    /// Depths along z in metres, NaN without a match. `is_bare` is true for labels whose surfaces have bare
-    /// spots.
+    /// Simulates depths along z, metres, NaN without a match. `is_bare` is true for the labels of surfaces
+    /// that have spots without texture.
     pub fn observe(
         &self,
         frame: &Frame,

@@ -14,7 +14,7 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// True if it stands on the floor and contains a point, within a margin of `margin_m`.
+    /// True if the wall stands on the floor and contains a point of the floor, within a margin of `margin_m`.
     pub fn blocks(&self, p: &Point2<f64>, margin_m: f64) -> bool {
         let within = |k: usize| p[k] >= self.low[k] - margin_m && p[k] <= self.high[k] + margin_m;
         self.low.z <= 0.0 && within(0) && within(1)
@@ -27,7 +27,8 @@ const SAME_EDGE_M: f64 = 1e-6;
 /// Subdivision of the plane at every edge of a room or a door.
 struct Cells {
     edges: [Vec<f64>; 2],
-    /// Height of the wall's lower end above the floor for each cell, row by row, metres; none for floor.
+    /// Height of the wall's lower end above the floor for each cell, row by row, metres; `None` where there
+    /// is no wall.
     from_m: Vec<Option<f64>>,
 }
 
@@ -63,7 +64,9 @@ impl Cells {
         self.edges[1].len() - 1
     }
 
-    /// Removes and returns the largest block of equal cells from a cell on, growing to the right and then up.
+    /// Removes the block of equal cells that begins at a cell and grows to the right, then up. Returns the
+    /// height of the wall's lower end, metres, and the column and row behind the block; `None` where there is
+    /// no wall.
     fn take(&mut self, column: usize, row: usize) -> Option<(f64, [usize; 2])> {
         let from_m = self.from_m[row * self.width() + column]?;
         let same = |cells: &Cells, c: usize, r: usize| cells.from_m[r * cells.width() + c] == Some(from_m);
@@ -78,8 +81,8 @@ impl Cells {
     }
 }
 
-/// The walls between rooms, up to the height of their bounding rectangle. A single room has only the walls of
-/// that rectangle.
+/// Walls between rooms, up to the height of the rooms' bounding rectangle. A single room has only the walls
+/// of that rectangle.
 pub fn walls(rooms: &[RoomSpec], doors: &[Doorway]) -> Vec<Wall> {
     if rooms.len() < 2 {
         return Vec::new();

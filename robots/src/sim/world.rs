@@ -34,15 +34,16 @@ pub enum Stand {
 pub struct Object {
     /// Unique in the scene.
     pub name: String,
-    /// Kind.
+    /// Kind of the object; several objects may be of one kind.
     pub kind: String,
     /// Shape of the object.
     pub shape: Shape,
     /// Red, green, blue.
     pub colour: [u8; 3],
-    /// State.
+    /// Place of the object: on a surface, on the floor, in the hand, or taken away.
     pub stands: Stand,
-    /// Pose of its base; the last one while it is held or taken away.
+    /// Pose of the object in the map, with the origin at the centre of its base; the last one while it is
+    /// held or taken away.
     pub map_from_object: Isometry3<f64>,
 }
 
@@ -59,7 +60,7 @@ impl Object {
         self.map_from_object * middle
     }
 
-    /// Name of the surface that it stands on.
+    /// Name of the surface on which the object stands, if any.
     pub fn surface(&self) -> Option<&str> {
         match &self.stands {
             Stand::On(surface) => Some(surface),
@@ -67,12 +68,12 @@ impl Object {
         }
     }
 
-    /// True if it stands in the scene, on a surface or on the floor.
+    /// True if the object stands in the scene, on a surface or on the floor.
     pub fn is_in_place(&self) -> bool {
         matches!(self.stands, Stand::On(_) | Stand::Floor)
     }
 
-    /// True if a height is between base and top, within a margin of `margin_m`.
+    /// True if a height in the map is between base and top of the object, within a margin of `margin_m`.
     pub fn is_at_height(&self, z_m: f64, margin_m: f64) -> bool {
         let above_m = z_m - self.map_from_object.translation.z;
         above_m >= -margin_m && above_m <= self.shape.height_m() + margin_m
@@ -82,7 +83,7 @@ impl Object {
 /// A door in its wall.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HungDoor {
-    /// Opening.
+    /// Opening in the wall.
     pub doorway: Doorway,
     /// True while the panel fills the opening.
     pub shut: bool,
@@ -93,34 +94,34 @@ pub struct HungDoor {
 pub struct Scene {
     /// Title for people.
     pub title: String,
-    /// The bounding rectangle of all rooms.
+    /// Bounding rectangle of all rooms.
     pub room: RoomSpec,
-    /// Rooms with names.
+    /// Rooms that have names.
     pub rooms: Vec<RoomSpec>,
-    /// Walls between them.
+    /// Walls between the rooms.
     pub walls: Vec<Wall>,
-    /// Doors in those walls.
+    /// Doors in the walls between the rooms.
     pub doors: Vec<HungDoor>,
-    /// Surfaces.
+    /// Support surfaces.
     pub surfaces: Vec<SurfaceSpec>,
-    /// Boxes on the floor.
+    /// Obstacles on the floor.
     pub obstacles: Vec<ObstacleSpec>,
     /// Initial pose of the robot.
     pub start: Pose2,
     /// Objects in the order of the scene file.
     pub objects: Vec<Object>,
-    /// Visibility required of the arrangement.
+    /// Visibility that the scene requires of one object, if any.
     pub target: Option<TargetSpec>,
-    /// Share of the target that the camera sees from the start.
+    /// Share of the target that the camera sees from the start, 0 to 1.
     pub target_visible_from_start: Option<f64>,
     /// False if the body has no map of the scene.
     pub mapped: bool,
     /// Stereo camera, if it replaces the depth camera.
     pub stereo: Option<Stereo>,
-    /// Light that the seed draws.
+    /// Light of the scene, drawn by the seed; without it, surfaces have the stated colours.
     #[serde(default)]
     pub light: Option<Light>,
-    /// Number of the visit.
+    /// Number of the current visit, from 1.
     pub visit: usize,
 }
 
@@ -136,28 +137,29 @@ pub const LABEL_OBJECT: u16 = 3;
 /// A rigid object of several surfaces.
 #[derive(Clone, Debug)]
 pub struct Solid {
-    /// Pose of its frame.
+    /// Pose of the solid's frame in the map.
     pub map_from_solid: Isometry3<f64>,
-    /// Surfaces.
+    /// Surfaces of the solid, in its own frame.
     pub parts: Vec<Primitive>,
-    /// Their colours, in the same order; empty: all have `colour`.
+    /// Colours of `parts`, in the same order; if empty, all have `colour`.
     pub paints: Vec<Paint>,
-    /// Its bounding box in its own frame.
+    /// Minimum and maximum corner of the bounding box in the solid's frame, metres.
     pub bounds: (Point3<f64>, Point3<f64>),
-    /// Red, green, blue.
+    /// Red, green, blue; the colour of parts without paint.
     pub colour: [u8; 3],
-    /// Label of its pixels.
+    /// Label of the pixels that show the solid.
     pub label: u16,
 }
 
 impl Solid {
-    /// First hit of a ray in the solid's own frame.
+    /// First hit of the ray o + t·d with t below `before`, in the solid's own frame.
     #[inline]
     pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
         self.meet(o, d, before).map(|(hit, _)| hit)
     }
 
-    /// First hit of a ray in the solid's own frame, with the index of the part.
+    /// First hit of the ray o + t·d with t below `before`, in the solid's own frame, and the index of the
+    /// part that is hit.
     #[inline]
     pub fn meet(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<(Hit, usize)> {
         let mut nearest = None;
@@ -171,7 +173,7 @@ impl Solid {
         nearest
     }
 
-    /// The colour of a part at a point in the solid's own frame.
+    /// Colour of a part at a point in the solid's own frame.
     pub fn colour_at(&self, part: usize, p: &Point3<f64>) -> [u8; 3] {
         self.paints.get(part).map_or(self.colour, |paint| paint.at(p))
     }
@@ -192,14 +194,14 @@ impl Solid {
     }
 }
 
-/// Side of a table's legs, metres.
+/// Thickness of a table's legs, metres.
 const LEG_M: f64 = 0.05;
 /// Thickness of a shelf's uprights, metres; they stand beside the boards and end below their tops,
 /// so that boards end as mapped.
 const UPRIGHT_M: f64 = 0.02;
 /// Thickness of a door's panel, metres.
 const PANEL_M: f64 = 0.04;
-/// Margin beyond the walls in the initial map of a body without one, metres.
+/// Margin around the walls in the initial map of a body that has no map of the scene, metres.
 const BEYOND_M: f64 = 10.0;
 /// Thickness of a seat on legs, metres.
 const SEAT_M: f64 = 0.06;
@@ -255,7 +257,7 @@ impl HungDoor {
 }
 
 impl ObstacleSpec {
-    /// An obstacle box that is missing in the map.
+    /// Creates an obstacle box that the map does not show.
     fn block(name: &str, position_m: [f64; 2], size_m: [f64; 3]) -> ObstacleSpec {
         ObstacleSpec {
             name: name.into(),
@@ -273,7 +275,7 @@ impl ObstacleSpec {
         }
     }
 
-    /// Frame at the centre of its base.
+    /// Pose of the obstacle in the map; the origin is the centre of its base.
     pub fn map_from_obstacle(&self) -> Isometry3<f64> {
         upright(self.position_m[0], self.position_m[1], 0.0, self.yaw_deg.to_radians())
     }
@@ -310,12 +312,12 @@ impl ObstacleSpec {
         Solid { parts, ..Solid::cuboid(self.map_from_obstacle(), low, high, self.colour) }
     }
 
-    /// True if a disc on the floor touches it.
+    /// True if a disc on the floor touches the obstacle's box.
     pub fn touches(&self, p: &Point2<f64>, radius_m: f64) -> bool {
         self.distance_m(p) < radius_m
     }
 
-    /// Distance of a floor point from its bounding box, metres; 0 inside.
+    /// Distance of a floor point from the obstacle's box, metres; 0 inside.
     pub fn distance_m(&self, p: &Point2<f64>) -> f64 {
         let local = self.map_from_obstacle().inverse_transform_point(&Point3::new(p.x, p.y, 0.0));
         let gap = |at: f64, size: f64| (at.abs() - 0.5 * size).max(0.0);
@@ -351,8 +353,8 @@ impl Scene {
         solids
     }
 
-    /// The map that mapping would give: surfaces and mapped obstacles projected to the floor, walls with
-    /// every door open.
+    /// Map as a mapping run would give it: surfaces and mapped obstacles projected to the floor, and walls
+    /// with every door open.
     pub fn map(&self) -> OccupancyGrid {
         let mut grid = OccupancyGrid::covering(self.room.low(), self.room.high(), MAP_RESOLUTION_M);
         // A cell is taken if anything reaches into it, so outlines grow by half a cell.
@@ -374,7 +376,8 @@ impl Scene {
         grid
     }
 
-    /// Initial map of the body: the rooms, or without a map a free area far beyond all walls.
+    /// Initial map of the body: that of the scene, or for a body without one, a free area far beyond all
+    /// walls.
     pub fn known_map(&self) -> OccupancyGrid {
         if self.mapped {
             return self.map();
@@ -383,7 +386,8 @@ impl Scene {
         OccupancyGrid::covering(self.room.low() - beyond, self.room.high() + beyond, MAP_RESOLUTION_M)
     }
 
-    /// Obstacles that the body's map does not show, as boxes: all of them without a map.
+    /// Obstacles that the body's map does not show; for a body without a map, everything it could run into,
+    /// as boxes.
     pub fn unknown(&self) -> Vec<ObstacleSpec> {
         if self.mapped {
             return self.obstacles.iter().filter(|o| !o.on_map).cloned().collect();
@@ -412,24 +416,24 @@ impl Scene {
         self.obstacles.iter().cloned().chain(surfaces).chain(walls).chain(around).collect()
     }
 
-    /// The named room that holds a point of the floor.
+    /// Name of the room that holds a point of the floor; `None` outside of all named rooms.
     pub fn room_at(&self, p: &Point2<f64>) -> Option<&str> {
         self.rooms.iter().find(|r| r.holds(p, 0.0)).map(|r| r.name.as_str())
     }
 
-    /// Surface of that name.
+    /// Surface of this name, if there is one.
     pub fn surface(&self, name: &str) -> Option<&SurfaceSpec> {
         self.surfaces.iter().find(|s| s.name == name)
     }
 
-    /// Object of that name.
+    /// Object of this name, if there is one.
     pub fn object(&self, name: &str) -> Option<&Object> {
         self.objects.iter().find(|o| o.name == name)
     }
 }
 
 impl Object {
-    /// Object as a solid for ray casting.
+    /// The object as a solid for ray casting.
     pub fn solid(&self, label: u16) -> Solid {
         let (parts, paints) = self.shape.painted(self.colour).into_iter().unzip();
         Solid {

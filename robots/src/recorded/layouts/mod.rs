@@ -1,6 +1,7 @@
-//! Layouts in which recordings are published, told apart by the contents of a folder.
+//! Layouts in which recordings are published, recognised by the contents of a folder.
 //!
-//! A layout yields frames as its files state them; units and conventions are settled in [`reading`](crate::recorded::reading).
+//! A layout gives frames as its files state them; units and conventions are resolved in
+//! [`reading`](crate::recorded::reading).
 
 mod bag;
 mod bop;
@@ -19,16 +20,16 @@ use std::path::Path;
 
 /// A published layout.
 pub struct Layout {
-    /// Name as an option's value.
+    /// Name on the command line.
     pub name: &'static str,
-    /// Files by which it is known.
+    /// Description of the files by which the layout is recognised.
     pub files: &'static str,
     /// True if a folder or file has this layout.
     is: fn(&Path) -> bool,
     read: fn(&Path, &Asked) -> Result<Stated, InputError>,
 }
 
-/// All layouts, the most telling first.
+/// All layouts, the most specific first.
 pub const LAYOUTS: [Layout; 8] = [
     Layout {
         name: "rosbag",
@@ -65,7 +66,7 @@ pub const LAYOUTS: [Layout; 8] = [
     Layout { name: "pcd", files: "*.pcd, each with its VIEWPOINT", is: pcds::is, read: pcds::read },
 ];
 
-/// The layout of a folder or file, if it is one of those that are known.
+/// Published layout of a folder or file; `None` if no known layout fits.
 pub fn layout_of(path: &Path) -> Option<&'static Layout> {
     LAYOUTS.iter().find(|layout| (layout.is)(path))
 }

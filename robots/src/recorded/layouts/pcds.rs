@@ -15,16 +15,19 @@ use std::path::{Path, PathBuf};
 
 /// Maximum size of a file, bytes. From: chosen.
 const MOST_BYTES: u64 = 1 << 30;
-/// Share of the pixels that a camera must explain. From: chosen.
+/// Minimum share of the points that a camera must project to their own pixels. From: chosen.
 const EXPLAINED: f64 = 0.9;
-/// Rows and columns of the image of a cloud without pixels, at the most and at the least. From: chosen.
+/// Minimum and maximum number of rows and columns of the image made from a cloud without pixels.
+/// From: chosen.
 const SIDE: [f64; 2] = [64.0, 320.0];
-/// Minimum number of cloud points for each image pixel; with fewer the image has holes.
+/// Minimum number of cloud points for each pixel of that image; with fewer, the image has holes.
 /// From: chosen.
 const POINTS_PER_PIXEL: f64 = 4.0;
-/// Share of the points in the virtual image, and limits of its half angle, as slopes. From: chosen.
+/// Share of the points that the virtual camera has in view. From: chosen.
 const IN_VIEW: f64 = 0.98;
+/// Minimum half angle of the virtual camera, as a slope. From: chosen.
 const NARROWEST: f64 = 0.05;
+/// Maximum half angle of the virtual camera, as a slope. From: chosen.
 const WIDEST: f64 = 2.0;
 
 pub(super) fn is(path: &Path) -> bool {
@@ -36,17 +39,17 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     names(folder).unwrap_or_default().into_iter().filter(is_pcd).map(|name| folder.join(name)).collect()
 }
 
-/// Frame of the points.
+/// Coordinate frame in which a file gives its points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Points {
     InSensor,
     InWorld,
 }
 
-/// Both possible frames of the points, that of the format definition first.
+/// Both possible frames of the points; the first is the one that the PCD format defines.
 const FRAMES: [Points; 2] = [Points::InSensor, Points::InWorld];
 
-/// File with its sensor pose, and the pose of its camera in the points' frame.
+/// A file with its sensor pose, and the pose of the camera in the frame of the points.
 #[derive(Clone, Debug)]
 struct Seen {
     path: PathBuf,
@@ -54,7 +57,7 @@ struct Seen {
     points_from_camera: Isometry3<f64>,
 }
 
-/// Files as seen by one camera.
+/// All files of a folder, as images of one camera.
 #[derive(Clone, Debug)]
 struct Pcds {
     files: Vec<Seen>,
@@ -63,21 +66,21 @@ struct Pcds {
     coloured: bool,
 }
 
-/// Summary of a cloud, for each possible frame of its points.
+/// Summary of a file; arrays have one entry for each of [`FRAMES`].
 struct Summary {
     path: PathBuf,
     viewpoint: Isometry3<f64>,
     coloured: bool,
-    /// Camera that explains the pixels, if any.
+    /// Camera that projects nearly all points to their own pixels, if there is one.
     cameras: [Option<Intrinsics>; 2],
     looks: [Look; 2],
 }
 
-/// A camera at the sensor that looks to the middle of the points.
+/// A virtual camera at the sensor, directed at the middle of the points.
 #[derive(Clone, Copy, Debug)]
 struct Look {
     points_from_camera: Isometry3<f64>,
-    /// Slope within which nearly all points are.
+    /// Half angle within which the share [`IN_VIEW`] of the points lies, as a slope.
     reach: f64,
     /// Number of points in front of the camera.
     points: usize,
@@ -153,7 +156,8 @@ impl Points {
 }
 
 impl Summary {
-    /// Reads a file; `first`: cameras of the first file, estimated if absent.
+    /// Reads a file; `first` holds the cameras of the first file. A camera that is missing there is
+    /// estimated.
     fn read(path: PathBuf, first: &[Option<Intrinsics>; 2]) -> Result<Summary, InputError> {
         let (cloud, viewpoint) = load(&path)?;
         let from_sensor = FRAMES.map(|points| points.pose_of_sensor(&viewpoint));
@@ -172,7 +176,8 @@ impl Summary {
     }
 }
 
-/// True if nearly all points lie at their own pixels.
+/// True if the camera projects nearly all points of the cloud to their own pixels; false for a cloud without
+/// pixels.
 fn explains(camera: &Intrinsics, cloud: &Cloud) -> bool {
     let Some(grid) = cloud.grid.filter(|g| (g.width, g.height) == (camera.width, camera.height)) else {
         return false;
@@ -219,7 +224,7 @@ impl Pcds {
         Pcds { files: all.iter().map(seen).collect(), camera, organised: true, coloured }
     }
 
-    /// Clouds without pixels, as seen by one virtual camera from each viewpoint.
+    /// Converts clouds without pixels to images of one virtual camera, placed at each viewpoint.
     fn loose(all: &[Summary], points: Points) -> Pcds {
         let look = |s: &'_ Summary| -> (f64, usize, Seen) {
             let Look { points_from_camera, reach, points } = s.looks[usize::from(points == Points::InWorld)];

@@ -12,11 +12,11 @@ use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Endings of colour images.
+/// File extensions of colour images.
 const COLOURS: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// Images in a folder with the number or stamp in their names, in natural order; empty for a
-/// missing folder.
+/// Images in a folder in natural order, each by its name without extension and its path; empty for a missing
+/// folder.
 pub(super) fn images(folder: &Path) -> Result<Vec<(String, PathBuf)>, InputError> {
     if !folder.is_dir() {
         return Ok(Vec::new());
@@ -27,13 +27,13 @@ pub(super) fn images(folder: &Path) -> Result<Vec<(String, PathBuf)>, InputError
     Ok(found.map(|name| (stem(&name).to_string(), folder.join(name))).collect())
 }
 
-/// First existing folder of several.
+/// First existing folder among the named ones; the first name if none exists.
 pub(super) fn either(folder: &Path, names: &[&str]) -> PathBuf {
     let found = names.iter().map(|name| folder.join(name)).find(|path| path.is_dir());
     found.unwrap_or_else(|| folder.join(names[0]))
 }
 
-/// Depth images of a folder, at least one.
+/// Depth images of a folder, as [`images`]; an error if there are none.
 pub(super) fn depths(folder: &Path) -> Result<Vec<(String, PathBuf)>, InputError> {
     let found = images(folder)?;
     if found.is_empty() {
@@ -43,19 +43,19 @@ pub(super) fn depths(folder: &Path) -> Result<Vec<(String, PathBuf)>, InputError
     Ok(found)
 }
 
-/// Images by the number in their names, which frames of other folders share.
+/// Images by the number at the end of their names, by which they belong to images in other folders.
 pub(super) fn by_number(images: Vec<(String, PathBuf)>) -> BTreeMap<u64, PathBuf> {
     images.into_iter().filter_map(|(name, path)| Some((number(&name)?, path))).collect()
 }
 
-/// Number at the end of a name: 12 of `frame000012`.
+/// Number at the end of a name: 12 of `frame000012`; `None` without one.
 pub(super) fn number(name: &str) -> Option<u64> {
     let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
     name[name.len() - digits..].parse().ok()
 }
 
-/// Camera given by the user, or from a file beside the frames, or the data set's default for images
-/// of this size.
+/// Camera that the user gives, or that of a file beside the frames, or else the data set's default, which
+/// holds for images of [`USUAL_SIZE`].
 pub(super) fn camera(
     folder: &Path,
     asked: &Asked,
@@ -86,10 +86,12 @@ pub(super) fn camera(
     }
 }
 
-/// Size of the images of first depth cameras, columns and rows.
+/// Image size for which a data set's default camera holds, columns and rows: that of the first consumer depth
+/// cameras.
 const USUAL_SIZE: (usize, usize) = (640, 480);
 
-/// Checks that a camera is one for images of a size.
+/// Checks that the focal lengths are positive and the principal point lies in an image of this size, columns
+/// and rows.
 pub(super) fn fitting(
     camera: CameraSettings,
     size: (usize, usize),
@@ -106,7 +108,7 @@ pub(super) fn fitting(
     Err(InputError::whole(place, problem, "give the camera of the depth images"))
 }
 
-/// Reads JSON; faults are shown at their place.
+/// Reads a JSON file; a syntax error is displayed with its line.
 pub(super) fn json<T: DeserializeOwned>(file: &Path) -> Result<T, InputError> {
     let text = read(file)?;
     serde_json::from_str(&text).map_err(|e| {
@@ -116,13 +118,13 @@ pub(super) fn json<T: DeserializeOwned>(file: &Path) -> Result<T, InputError> {
     })
 }
 
-/// Pose from twelve or sixteen numbers, row by row; `None` if not finite.
+/// Pose from the sixteen numbers of a 4x4 matrix, row by row; `None` if one is not finite.
 pub(super) fn pose_of(place: &str, rows: &[f64]) -> Result<Option<Isometry3<f64>>, InputError> {
     let text: Vec<String> = rows.chunks(4).map(|r| format!("{} {} {} {}", r[0], r[1], r[2], r[3])).collect();
     pose::matrix_pose(place, &text.join("\n"))
 }
 
-/// Frames whose pose is known, with their images, and a note of the others.
+/// Frames whose pose is known, with their images, and the number of the others.
 #[derive(Default)]
 pub(super) struct Gathered {
     pub frames: Vec<StatedFrame>,
@@ -132,7 +134,7 @@ pub(super) struct Gathered {
 }
 
 impl Gathered {
-    /// Adds a frame; a frame without a pose is only counted.
+    /// Adds a frame; without a pose, the frame is only counted as lost by tracking.
     pub(super) fn add(
         &mut self,
         name: String,
@@ -149,7 +151,7 @@ impl Gathered {
         }
     }
 
-    /// Counts a frame without a pose.
+    /// Counts a frame to which no pose belongs.
     pub(super) fn without_pose(&mut self) {
         self.unposed += 1;
     }

@@ -48,7 +48,8 @@ pub(super) fn is(path: &Path) -> bool {
     path.join("depth").is_dir() && trajectory(path).is_some()
 }
 
-/// File of the trajectory, in the folder: one that ends in `.log`, or one in JSON whose name says it.
+/// File of the trajectory in the folder: one that ends in `.log`, or else a JSON file with `trajectory` in
+/// its name.
 fn trajectory(folder: &Path) -> Option<PathBuf> {
     let names = names(folder).ok()?;
     let json = |n: &&String| n.ends_with(".json") && n.contains("trajectory");
@@ -117,7 +118,8 @@ pub(super) fn read(folder: &Path, asked: &Asked) -> Result<Stated, InputError> {
     })
 }
 
-/// A file of Open3D's `PinholeCameraIntrinsic`, in the folder: JSON whose name says camera or intrinsic.
+/// File of Open3D's `PinholeCameraIntrinsic` in the folder: a JSON file with `camera` or `intrinsic` in its
+/// name.
 fn beside(folder: &Path) -> Option<PathBuf> {
     let says = |n: &String| n.ends_with(".json") && (n.contains("intrinsic") || n.contains("camera"));
     names(folder).ok()?.into_iter().find(|n| says(n) && !n.contains("trajectory")).map(|n| folder.join(n))

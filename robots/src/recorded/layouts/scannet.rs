@@ -45,7 +45,7 @@ pub(super) fn read(folder: &Path, asked: &Asked) -> Result<Stated, InputError> {
     })
 }
 
-/// Camera of `intrinsic/intrinsic_depth.txt`, a matrix of 4x4 or 3x3.
+/// Camera that the user gives, or that of `intrinsic/intrinsic_depth.txt`, a matrix of 4x4 or 3x3.
 fn camera(
     folder: &Path,
     asked: &Asked,

@@ -15,13 +15,14 @@ const DEPTH_SCALE: f64 = 1000.0;
 /// Camera of its depth images. From: the data set's page.
 const KINECT: CameraSettings = CameraSettings { fx: 585.0, fy: 585.0, cx: 320.0, cy: 240.0 };
 
-/// A folder with a camera of its own is in our layout, which is this one with its camera.
+/// True for a folder with 7-Scenes frames and without a camera file; with one, the folder is in descry's own
+/// layout.
 pub(super) fn is(path: &Path) -> bool {
     !path.join(CAMERA_FILE).is_file()
         && names(path).is_ok_and(|names| names.iter().any(|name| frame(name).is_some()))
 }
 
-/// The frame of a depth image: `frame-` and six digits.
+/// Name of the frame of a depth image file: `frame-` and six digits; `None` for other files.
 fn frame(name: &str) -> Option<&str> {
     let stem = name.strip_suffix(DEPTH)?;
     let digits = stem.strip_prefix("frame-")?;

@@ -16,15 +16,17 @@ const DEPTH_SCALE: f64 = 5000.0;
 /// Maximum difference between the stamps of depth and colour image, seconds. From: the data set's
 /// tool `associate.py`.
 const BESIDE_S: f64 = 0.02;
-/// Longest gap of the trajectory across which a pose is interpolated, seconds. From: chosen, ten poses of the slowest trajectory.
+/// Longest gap of the trajectory across which a pose is interpolated, seconds. From: chosen, ten poses of the
+/// slowest trajectory.
 const GAP_S: f64 = 0.1;
-/// Cameras of the sequences, by a word in the folder's name: fx, fy, cx, cy. From: the data set's page on intrinsics.
+/// Cameras of the sequences (fx, fy, cx, cy in pixels), by a word in the folder's path. From: the data set's
+/// page on intrinsics.
 const CAMERAS: [(&str, [f64; 4]); 3] = [
     ("freiburg1", [517.3, 516.5, 318.6, 255.3]),
     ("freiburg2", [520.9, 521.0, 325.1, 249.7]),
     ("freiburg3", [535.4, 539.2, 320.1, 247.6]),
 ];
-/// The data set's camera where the sequence is not known.
+/// The data set's default camera (fx, fy, cx, cy in pixels), for unknown sequences.
 const USUAL: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
 
 pub(super) fn is(path: &Path) -> bool {
@@ -99,8 +101,8 @@ fn camera(
 
 type Stamped = Vec<(f64, PathBuf)>;
 
-/// Images with their stamps, in time order: those listed in `NAME.txt`, or else the files in folder
-/// `NAME`.
+/// Images with their stamps in seconds, in time order: those listed in `NAME.txt`, or else the files in
+/// folder `NAME`.
 fn stamped(folder: &Path, name: &str) -> Result<Stamped, InputError> {
     let list = folder.join(format!("{name}.txt"));
     let mut found = Vec::new();
@@ -131,7 +133,7 @@ fn stamped(folder: &Path, name: &str) -> Result<Stamped, InputError> {
     Ok(found)
 }
 
-/// Poses of `stamp tx ty tz qx qy qz qw`, in order of time.
+/// Poses with their stamps in seconds, in time order, from lines `stamp tx ty tz qx qy qz qw`.
 fn trajectory(file: &Path) -> Result<Vec<(f64, Isometry3<f64>)>, InputError> {
     let content = text(file)?;
     let mut found = Vec::new();

@@ -22,20 +22,20 @@ pub enum DoorState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DoorSpec {
-    /// Unique among the doors.
+    /// Name of the door, unique in the scene.
     pub name: String,
-    /// Centre of the opening, map frame, within the wall.
+    /// Centre of the opening, map frame, within the wall, metres.
     pub position_m: [f64; 2],
-    /// Width of the opening along the wall.
+    /// Width of the opening along the wall, metres.
     #[serde(default = "default_width_m")]
     pub width_m: f64,
-    /// Height of the opening above the floor.
+    /// Height of the opening above the floor, metres.
     #[serde(default = "default_height_m")]
     pub height_m: f64,
     /// Initial state; open if neither this nor `shut_chance` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<DoorState>,
-    /// Or the probability of being shut initially, drawn by the seed.
+    /// Probability that the door is shut initially, drawn by the seed; an alternative to `state`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shut_chance: Option<f64>,
 }
@@ -53,19 +53,19 @@ const THICKEST_M: f64 = 0.6;
 /// The opening of a door, derived from the rooms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Doorway {
-    /// Name for people.
+    /// Name of the door for people.
     pub name: String,
     /// Centre of the opening, map frame, metres.
     pub centre_m: Point2<f64>,
     /// Axis of the map parallel to the wall: 0 for x, 1 for y.
     pub along: usize,
-    /// Width along the wall, metres.
+    /// Width of the opening along the wall, metres.
     pub width_m: f64,
-    /// Height above the floor, metres.
+    /// Height of the opening above the floor, metres.
     pub height_m: f64,
     /// Thickness of the wall, metres.
     pub thickness_m: f64,
-    /// The rooms on either side.
+    /// Names of the rooms on either side.
     pub between: [String; 2],
 }
 
@@ -77,7 +77,7 @@ impl Doorway {
         half
     }
 
-    /// Map entry of the door.
+    /// The door as the map of a body shows it.
     pub(crate) fn hint(&self) -> Door {
         Door {
             name: self.name.clone(),
@@ -96,7 +96,8 @@ impl Doorway {
 }
 
 impl DoorSpec {
-    /// The nearest room on each side of the door across a wall along `axis`, with the gap between them.
+    /// Nearest room on each side of the door across a wall along `axis`, and the two faces of the wall,
+    /// metres along the other axis; `None` if there is no wall of at most [`THICKEST_M`].
     fn sides<'a>(&self, rooms: &'a [RoomSpec], axis: usize) -> Option<([&'a RoomSpec; 2], [f64; 2])> {
         let across = 1 - axis;
         let half_m = 0.5 * self.width_m;
@@ -113,7 +114,8 @@ impl DoorSpec {
         (wall[1] - wall[0] <= THICKEST_M).then_some(([below, above], wall))
     }
 
-    /// The opening, if the door lies in a wall between two rooms that both extend along all of it.
+    /// Opening of the door; `None` unless it lies in a wall between two rooms that both extend along all of
+    /// the opening.
     pub fn doorway(&self, rooms: &[RoomSpec]) -> Option<Doorway> {
         let (along, (sides, wall)) = [0, 1].into_iter().find_map(|k| Some((k, self.sides(rooms, k)?)))?;
         let mut centre_m = Point2::from(self.position_m);

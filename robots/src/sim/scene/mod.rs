@@ -19,7 +19,7 @@
 //! size_m = [0.9, 0.3]
 //! height_m = 1.15
 //!
-//! [[obstacle]]                      # boxes on the floor; `on_map = false`: nobody told the robot
+//! [[obstacle]]                      # boxes on the floor; with `on_map = false` missing in the robot's map
 //! name = "cupboard"
 //! position_m = [2.6, -1.5]
 //! size_m = [0.5, 1.0, 1.8]
@@ -45,19 +45,20 @@
 //! [[object]]
 //! name = "box"
 //! on = ["table", "upper board"]     # the surface, or several of which the seed chooses; the first of the scene if left out
-//! weights = [3.0, 1.0]              # how likely each is; equal if left out
-//! apart_from = "cup A"              # on another surface than an object above
+//! weights = [3.0, 1.0]              # weight of each surface; equal if left out
+//! apart_from = "cup A"              # on another surface than this earlier object
 //! shape.box = { size_m = [0.25, 0.12, 0.28] }
 //! area_m = [0.8, 0.5]               # arranged within this rectangle around the centre of the surface
-//! scale = [0.9, 1.1]                # made larger or smaller by the seed
+//! scale = [0.9, 1.1]                # scaled by a factor that the seed draws
 //!
 //! [target]                          # only arrangements are taken where this holds
 //! object = "cup A"
-//! visible_from_start = [0.0, 0.0]   # least and greatest share of it that the camera sees from the start
-//! visible_from_some = 0.6           # and what some pose around the surface sees at least
+//! visible_from_start = [0.0, 0.0]   # minimum and maximum share of the object that is visible from the start
+//! visible_from_some = 0.6           # minimum share that is visible from some pose around the surface
 //! ```
 //!
-//! Before all that may stand `mapped = false`: the body knows nothing of the scene but where it stands in it. And it may have a pair of cameras:
+//! With `mapped = false` at the beginning, the body has no map of the scene and knows only its own pose in it.
+//! A stereo camera may replace the depth camera:
 //!
 //! ```toml
 //! [stereo]
@@ -66,7 +67,7 @@
 //! textured = 0.5                    # share of floor and walls on which anything can be matched
 //! ```
 //!
-//! Light that differs from seed to seed is said by ranges:
+//! Light that differs from seed to seed is given by ranges:
 //!
 //! ```toml
 //! [light]
@@ -76,7 +77,8 @@
 //! noise = 4.0                       # of 255, each channel of each pixel
 //! ```
 //!
-//! What comes, goes and moves between visits stands in one scene; `visit = 2` at its beginning makes it that of the second:
+//! One scene describes several visits, between which objects come, go and move; `visit = 2` at the beginning
+//! selects the second:
 //!
 //! ```toml
 //! visits = 3                        # at the beginning
@@ -84,11 +86,12 @@
 //! [[object]]
 //! name = "kettle"
 //! shape.household = "kettle"        # composed of several solids, painted; or shape.composed = { parts = [...] }
-//! visits = [2, 3]                   # when it is there; always if left out
-//! moves = [3]                       # when it stands elsewhere than in the visit before
+//! visits = [2, 3]                   # visits in which it is present; all if left out
+//! moves = [3]                       # visits in which it stands elsewhere than in the one before
 //! ```
 //!
-//! A flat has several rooms instead of the one. What lies between them is wall, as high as the highest; doors are openings in it:
+//! A flat has several rooms. The space between them is wall, as high as the highest room; doors are openings
+//! in it:
 //!
 //! ```toml
 //! [[room]]
@@ -129,7 +132,7 @@ use check::{finite, object, positive};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-/// A scene file: fixed values, and ranges for a seed to choose from.
+/// Content of a scene file: fixed values, and ranges from which a seed draws.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
@@ -171,7 +174,7 @@ pub struct SceneSpec {
     /// Number of visits, between which objects appear, disappear and move.
     #[serde(default = "default_one")]
     pub visits: usize,
-    /// Number of the current visit.
+    /// Number of the current visit, from 1.
     #[serde(default = "default_one")]
     pub visit: usize,
     /// Injected faults.
@@ -191,9 +194,9 @@ fn default_true() -> bool {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartSpec {
-    /// Position in the map frame.
+    /// Position in the map frame, metres.
     pub position_m: [f64; 2],
-    /// Heading, counter-clockwise from the map's x.
+    /// Heading, counter-clockwise from the map's x, degrees.
     #[serde(default)]
     pub yaw_deg: f64,
 }
@@ -206,7 +209,7 @@ fn default_grey() -> [u8; 3] {
 }
 
 impl FaultPlan {
-    /// Joins the faults of a scene with these, the scene's first.
+    /// Joins the faults of a scene with these faults, the scene's first.
     pub fn after(self, scene: &SceneSpec) -> FaultPlan {
         FaultPlan { faults: scene.faults.iter().cloned().chain(self.faults).collect() }
     }
@@ -225,7 +228,7 @@ impl SceneSpec {
         }
     }
 
-    /// The scene without an object (or all objects of a kind), for questions about absent things; a
+    /// Copies the scene without an object (or all objects of a kind), for questions about absent things; a
     /// `[target]` about it is removed as well.
     pub fn without(&self, name_or_kind: &str) -> SceneSpec {
         let mut spec = self.clone();
@@ -238,7 +241,8 @@ impl SceneSpec {
         spec
     }
 
-    /// Checks what the format cannot: positive sizes, unique and known names, everything within the room.
+    /// Checks what the format cannot express: positive sizes, unique and known names, everything within the
+    /// room.
     ///
     /// # Errors
     /// The first objection, with its path in the document.
@@ -265,7 +269,7 @@ impl SceneSpec {
         self.check_target()
     }
 
-    /// True if an object with these visits (empty: all) is present in `visit`.
+    /// True if something that is present in these visits (empty: all) is present in `visit`.
     pub(crate) fn is_there(&self, visits: &[usize], visit: usize) -> bool {
         visits.is_empty() || visits.contains(&visit)
     }

@@ -12,35 +12,36 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectSpec {
-    /// Unique in the scene.
+    /// Name of the object, unique in the scene.
     pub name: String,
-    /// Kind; the name if left out.
+    /// Kind of the object; the name if left out.
     #[serde(default)]
     pub kind: Option<String>,
     /// Shape of the object.
     pub shape: Shape,
-    /// The surface of the object, or several for the seed to choose from; the first of the scene if left out.
+    /// Names of the surfaces from which the seed chooses; the first surface of the scene if left out.
     #[serde(default, with = "one_or_many", skip_serializing_if = "Vec::is_empty")]
     pub on: Vec<String>,
     /// Weight of each surface; equal if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<Vec<f64>>,
-    /// An earlier object; this one is placed on another surface than that.
+    /// Name of an earlier object; this one is placed on another surface than that one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub apart_from: Option<String>,
-    /// Fixed position, from the centre of the surface along its axes.
+    /// Fixed position, from the centre of the surface along its axes, metres.
     #[serde(default)]
     pub position_m: Option<[f64; 2]>,
-    /// Fixed rotation on the surface.
+    /// Fixed rotation on the surface, degrees.
     #[serde(default)]
     pub yaw_deg: Option<f64>,
-    /// Rectangle for the arrangement, along the surface's axes; the whole surface if left out.
+    /// Size of the rectangle in which the object is placed, along the surface's axes, metres; the whole
+    /// surface if left out.
     #[serde(default)]
     pub area_m: Option<[f64; 2]>,
-    /// Centre of that rectangle, from the centre of the surface.
+    /// Centre of that rectangle, from the centre of the surface, metres.
     #[serde(default)]
     pub area_centre_m: [f64; 2],
-    /// Minimum and maximum scale factor, drawn by the seed.
+    /// Minimum and maximum factor by which the shape is scaled, drawn by the seed.
     #[serde(default)]
     pub scale: Option<[f64; 2]>,
     /// Red, green, blue.
@@ -49,7 +50,7 @@ pub struct ObjectSpec {
     /// The visits in which the object is present; all if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visits: Vec<usize>,
-    /// The visits in which the object stands elsewhere than in the previous one.
+    /// The visits in which the object stands elsewhere than in the visit before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<usize>,
 }
@@ -60,11 +61,11 @@ pub struct ObjectSpec {
 pub struct TargetSpec {
     /// Name of the object.
     pub object: String,
-    /// Minimum and maximum share visible from the start, with the camera turned to the object. 0 to 0 hides
-    /// it.
+    /// Minimum and maximum share of the object visible from the start, with the camera turned to it. 0 to 0
+    /// requires that the object is hidden.
     #[serde(default = "default_any_share")]
     pub visible_from_start: [f64; 2],
-    /// Minimum share visible from some pose around its surface; 0 requires nothing.
+    /// Minimum share of the object visible from some pose around its surface; 0 requires nothing.
     #[serde(default = "default_some_share")]
     pub visible_from_some: f64,
 }
@@ -118,7 +119,7 @@ impl SceneSpec {
         finite(&[o.yaw_deg.unwrap_or(0.0)], &at("yaw_deg"))
     }
 
-    /// Checks that its surfaces exist, have enough headroom, and have weights.
+    /// Checks that the surfaces of an object exist and have enough headroom, and that its weights are valid.
     fn check_on(&self, o: &ObjectSpec, at: &impl Fn(&'static str) -> Vec<Step>) -> Result<(), Objection> {
         let known: Vec<&str> = self.surfaces.iter().map(|s| s.name.as_str()).collect();
         if known.is_empty() && o.on.is_empty() {
@@ -193,7 +194,7 @@ impl SceneSpec {
         Ok(())
     }
 
-    /// The possible surfaces of an object.
+    /// Possible surfaces of an object.
     pub(crate) fn surfaces_of(&self, o: &ObjectSpec) -> Vec<&SurfaceSpec> {
         if o.on.is_empty() {
             return self.surfaces.iter().take(1).collect();

@@ -28,14 +28,14 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for OneOrMany<T> {
     }
 }
 
-/// Reads `key = one` and `key = [one, another]`.
+/// Reads `key = one` and `key = [one, another]` as a list.
 pub(super) fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     from: D,
 ) -> Result<Vec<T>, D::Error> {
     from.deserialize_any(OneOrMany(PhantomData))
 }
 
-/// Writes one thing as itself.
+/// Writes a list of one element as that element, and any other as a list.
 pub(super) fn serialize<S: Serializer, T: Serialize>(things: &[T], to: S) -> Result<S::Ok, S::Error> {
     match things {
         [one] => one.serialize(to),

@@ -13,12 +13,12 @@ pub struct RoomSpec {
     /// Unique among the rooms; empty for the only room of a scene.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// Centre, map frame.
+    /// Centre of the room, map frame, metres.
     #[serde(default)]
     pub position_m: [f64; 2],
-    /// Inner size along x and y.
+    /// Inner size along x and y, metres.
     pub size_m: [f64; 2],
-    /// Height of the walls; the maximum over all rooms applies.
+    /// Height of the walls, metres; the maximum over all rooms applies.
     #[serde(default = "default_wall_height_m")]
     pub wall_height_m: f64,
 }
@@ -48,28 +48,28 @@ const LARGEST_M: f64 = 100.0;
 pub(crate) const TOUCHING_M: f64 = 1e-6;
 
 impl RoomSpec {
-    /// The minimum corner.
+    /// Minimum corner of the floor, map frame, metres.
     pub fn low(&self) -> Point2<f64> {
         Point2::new(self.position_m[0] - 0.5 * self.size_m[0], self.position_m[1] - 0.5 * self.size_m[1])
     }
 
-    /// The maximum corner.
+    /// Maximum corner of the floor, map frame, metres.
     pub fn high(&self) -> Point2<f64> {
         Point2::new(self.position_m[0] + 0.5 * self.size_m[0], self.position_m[1] + 0.5 * self.size_m[1])
     }
 
-    /// Corners of its floor in the map, in order.
+    /// Corners of the floor in order, map frame, metres.
     pub fn outline_m(&self) -> Vec<Point2<f64>> {
         let (low, high) = (self.low(), self.high());
         vec![low, Point2::new(high.x, low.y), high, Point2::new(low.x, high.y)]
     }
 
-    /// True if a point is on its floor or at most `margin_m` outside.
+    /// True if a point is on the room's floor or at most `margin_m` outside.
     pub fn holds(&self, p: &Point2<f64>, margin_m: f64) -> bool {
         (0..2).all(|k| (p[k] - self.position_m[k]).abs() <= 0.5 * self.size_m[k] + margin_m)
     }
 
-    /// The smallest rectangle around rooms, without a name.
+    /// Smallest rectangle around all rooms, with the height of the highest and without a name.
     pub fn around(rooms: &[RoomSpec]) -> RoomSpec {
         if let [one] = rooms {
             return RoomSpec { name: String::new(), ..one.clone() };
@@ -93,7 +93,7 @@ impl RoomSpec {
 }
 
 impl SceneSpec {
-    /// Path of a key of a room in the document: a single `[room]` is not a list.
+    /// Path in the document to a key of the room with index `i`: a single `[room]` is not a list.
     fn room_path(&self, i: usize, key: &'static str) -> Vec<Step> {
         match self.rooms.as_slice() {
             [one] if one.name.is_empty() => vec![Step::Key("room"), Step::Key(key)],
@@ -144,7 +144,7 @@ impl SceneSpec {
         Ok(())
     }
 
-    /// The rooms with names.
+    /// Rooms that have names.
     pub(crate) fn named_rooms(&self) -> impl Iterator<Item = &RoomSpec> {
         self.rooms.iter().filter(|r| !r.name.is_empty())
     }

@@ -8,14 +8,14 @@ use crate::sim::outline::{Outline, gap_between, upright};
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Support of a surface.
+/// Kind of support that holds up a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceKind {
     /// Four legs.
     #[default]
     Table,
-    /// A wall, or uprights at the ends: a shelf board, a counter.
+    /// A wall, or upright panels at the ends: a shelf board, a counter.
     Board,
 }
 
@@ -23,25 +23,25 @@ pub enum SurfaceKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSpec {
-    /// Unique among the surfaces.
+    /// Name of the surface, unique in the scene.
     pub name: String,
-    /// Kind of support.
+    /// Kind of support that holds up the surface.
     #[serde(default)]
     pub kind: SurfaceKind,
-    /// True for side panels from the floor to a board, at both ends of its own x.
+    /// True if a board has side panels down to the floor, at both ends of its own x.
     #[serde(default)]
     pub uprights: bool,
-    /// Centre, map frame.
+    /// Centre of the surface, map frame, metres.
     #[serde(default)]
     pub position_m: [f64; 2],
-    /// Rotation, counter-clockwise.
+    /// Rotation, counter-clockwise, degrees.
     #[serde(default)]
     pub yaw_deg: f64,
-    /// Size along its own x and y.
+    /// Size along the surface's own x and y, metres.
     pub size_m: [f64; 2],
-    /// Height of the top above the floor.
+    /// Height of the top above the floor, metres.
     pub height_m: f64,
-    /// Thickness of the top.
+    /// Thickness of the top, metres.
     #[serde(default = "default_thickness_m")]
     pub thickness_m: f64,
     /// Red, green, blue.
@@ -49,38 +49,38 @@ pub struct SurfaceSpec {
     pub colour: [u8; 3],
 }
 
-/// A box on the floor, optionally with rounded edges, or a seat on four legs.
+/// A box on the floor, optionally with rounded vertical edges, or a seat on four legs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleSpec {
     /// Name for messages.
     pub name: String,
-    /// Centre, map frame.
+    /// Centre of the obstacle, map frame, metres.
     pub position_m: [f64; 2],
-    /// Rectangle around that position within which the seed places and turns it.
+    /// Size of a rectangle around that position, metres, within which the seed places and turns the obstacle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread_m: Option<[f64; 2]>,
-    /// Minimum gap to the other obstacles where the seed places it.
+    /// Minimum gap to obstacles placed before, metres, where the seed places the obstacle.
     #[serde(default)]
     pub gap_m: f64,
-    /// Rotation, counter-clockwise.
+    /// Rotation, counter-clockwise, degrees.
     #[serde(default)]
     pub yaw_deg: f64,
-    /// Size along its own x and y, and its height.
+    /// Size along the obstacle's own x and y, and its height, metres.
     pub size_m: [f64; 3],
-    /// Radius of its vertical edges.
+    /// Radius of the vertical edges, metres.
     #[serde(default)]
     pub corner_m: f64,
-    /// Thickness of the legs of a seat; left out for a box.
+    /// Thickness of the legs of a seat, metres; left out for a box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub legs_m: Option<f64>,
     /// Height of the back above the seat, metres; left out for a seat without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub back_m: Option<f64>,
-    /// The visits in which it is present; all if left out.
+    /// The visits in which the obstacle is present; all if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visits: Vec<usize>,
-    /// True if the robot's map shows it.
+    /// True if the robot's map shows the obstacle.
     #[serde(default = "default_true")]
     pub on_map: bool,
     /// Red, green, blue.
@@ -102,17 +102,17 @@ fn default_wood() -> [u8; 3] {
 const IN_WALL_M: f64 = 1e-3;
 
 impl SurfaceSpec {
-    /// Frame of the top: origin at its centre, z up.
+    /// Pose of the top in the map: origin at its centre, z up.
     pub fn map_from_top(&self) -> Isometry3<f64> {
         upright(self.position_m[0], self.position_m[1], self.height_m, self.yaw_deg.to_radians())
     }
 
-    /// Centre, projected onto the floor of the map.
+    /// Centre of the surface in the map's x-y plane, metres.
     pub fn centre_m(&self) -> Point2<f64> {
         Point2::from(self.position_m)
     }
 
-    /// Corners of the top in the map, in order.
+    /// Corners of the top in order, map frame, metres.
     pub fn outline_m(&self) -> Vec<Point2<f64>> {
         let [x, y] = self.size_m.map(|s| 0.5 * s);
         let top = self.map_from_top();
@@ -122,7 +122,7 @@ impl SurfaceSpec {
             .collect()
     }
 
-    /// True if a point of the map, at any height, is above or below the top or at most `margin_m` beside it.
+    /// True if a point of the floor plan is on the top or at most `margin_m` beside it.
     pub fn covers(&self, p: &Point2<f64>, margin_m: f64) -> bool {
         let local = self.map_from_top().inverse_transform_point(&Point3::new(p.x, p.y, self.height_m));
         local.x.abs() <= 0.5 * self.size_m[0] + margin_m && local.y.abs() <= 0.5 * self.size_m[1] + margin_m
@@ -194,8 +194,8 @@ impl SceneSpec {
     }
 }
 
-/// Headroom above a surface, up to the lowest of `surfaces` above any part of it, metres; infinite if there
-/// is none.
+/// Headroom above the surface `below`, up to the lowest of `surfaces` above any part of it, metres; infinite
+/// if there is none.
 pub(crate) fn headroom_m(surfaces: &[SurfaceSpec], below: &SurfaceSpec) -> f64 {
     let overlaps = |other: &&SurfaceSpec| {
         let at = |s: &SurfaceSpec| {

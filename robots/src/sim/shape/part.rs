@@ -5,61 +5,61 @@ use nalgebra::{Isometry3, Point3, Vector3};
 /// A surface with a closed-form ray intersection (the handle: to a tenth of a millimetre).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Primitive {
-    /// Side of a cone around z between two heights: radius = `axis_m` + `slope`·z.
+    /// Side of a cone around the z axis between two heights: radius = `axis_m` + `slope`·z.
     Frustum {
-        /// Radius at z = 0.
+        /// Radius at z = 0, metres.
         axis_m: f64,
-        /// Change of radius a metre.
+        /// Change of the radius along z, metres a metre.
         slope: f64,
-        /// Lower end.
+        /// Lower end along z, metres.
         low_m: f64,
-        /// Upper end.
+        /// Upper end along z, metres.
         high_m: f64,
     },
     /// A horizontal ring.
     Disc {
-        /// Height.
+        /// Height along z, metres.
         z_m: f64,
-        /// Radius of the hole.
+        /// Radius of the hole, metres.
         inner_m: f64,
-        /// Outer radius.
+        /// Outer radius, metres.
         outer_m: f64,
     },
-    /// Half of an upright torus in the x-z plane, on the side away from the axis.
+    /// Half of an upright torus in the x-z plane, on the side away from the z axis.
     Handle {
-        /// Centre of the ring.
+        /// Centre of the ring, metres.
         centre: Point3<f64>,
-        /// Radius from the ring's centre to the centre of the rod.
+        /// Radius from the ring's centre to the centre of the bent rod, metres.
         major_m: f64,
-        /// Half the thickness of the rod.
+        /// Half the thickness of the bent rod, metres.
         minor_m: f64,
     },
     /// A box around the z axis, standing on z = 0, with rounded vertical edges.
     Rounded {
-        /// Maximum corner of its bounding box.
+        /// Maximum corner of the bounding box, metres.
         high: Point3<f64>,
-        /// Radius of the edges.
+        /// Radius of the vertical edges, metres.
         corner_m: f64,
     },
-    /// A box.
+    /// A box aligned with the axes.
     Cuboid {
-        /// Minimum corner.
+        /// Minimum corner, metres.
         low: Point3<f64>,
-        /// Maximum corner.
+        /// Maximum corner, metres.
         high: Point3<f64>,
     },
-    /// An ellipsoid.
+    /// An ellipsoid aligned with the axes.
     Ball {
-        /// Centre.
+        /// Centre, metres.
         middle: Point3<f64>,
-        /// Half axes.
+        /// Half axes, metres.
         half: Vector3<f64>,
     },
-    /// Another surface in a frame of its own.
+    /// Another surface, given in a frame of its own.
     Turned {
-        /// Pose of that frame.
+        /// Transform from this frame to the frame of `part`.
         part_from_here: Isometry3<f64>,
-        /// Surface there.
+        /// The surface, in its own frame.
         part: Box<Primitive>,
     },
 }
@@ -67,13 +67,13 @@ pub enum Primitive {
 /// Hit of a ray on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Ray parameter, in units of the ray's direction.
+    /// Ray parameter of the hit: distance along the ray, in lengths of the ray's direction vector.
     pub t: f64,
     /// Unit normal, outward or inward.
     pub normal: Vector3<f64>,
 }
 
-/// Minimum ray parameter of a hit, which excludes the ray's own start.
+/// Minimum ray parameter of a hit, which excludes the start of the ray itself.
 const NEAREST_T: f64 = 1e-6;
 const HANDLE_TOLERANCE_M: f64 = 1e-4;
 const HANDLE_STEPS: usize = 64;
@@ -89,12 +89,12 @@ impl Primitive {
         Primitive::Ball { middle: Point3::new(0.0, 0.0, low_m + half.z), half: *half }
     }
 
-    /// Surface in another frame.
+    /// Wraps the surface for a frame from which `part_from_here` transforms to the surface's own.
     pub(crate) fn turned(self, part_from_here: Isometry3<f64>) -> Primitive {
         Primitive::Turned { part_from_here, part: Box::new(self) }
     }
 
-    /// First hit with 0 < t < `before`.
+    /// First hit of the ray o + t·d with t between `NEAREST_T` and `before`.
     #[inline]
     pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
         match *self {
@@ -201,7 +201,7 @@ fn cuboid_hit(
     Some(Hit { t, normal })
 }
 
-/// Intersects an ellipsoid, by scaling it to the unit sphere.
+/// Intersects a ray with an ellipsoid, by scaling the ellipsoid to the unit sphere.
 #[inline]
 fn ball_hit(
     o: &Point3<f64>,
@@ -221,8 +221,8 @@ fn ball_hit(
     (t < before).then(|| Hit { t, normal: (from + along * t).component_div(half).normalize() })
 }
 
-/// Intersects a rounded box: the convex union of two boxes and four cylinders, which a ray from outside
-/// enters where it enters the first of them.
+/// Intersects a ray with a rounded box: the convex union of two boxes and four cylinders, which a ray from
+/// outside enters where it enters the first of them.
 fn rounded_hit(
     o: &Point3<f64>,
     d: &Vector3<f64>,
@@ -245,8 +245,8 @@ fn rounded_hit(
     boxes.chain(edges).min_by(|a, b| a.t.total_cmp(&b.t))
 }
 
-/// Intersects a handle by sphere tracing: the distance to half a torus is exact, so no step passes through
-/// it.
+/// Intersects a ray with a handle by sphere tracing: the distance to half a torus is exact, so no step passes
+/// through the handle.
 fn handle_hit(
     o: &Point3<f64>,
     d: &Vector3<f64>,

@@ -1,8 +1,8 @@
-//! CDR, in which ROS 2 writes messages, and the messages that are used of a bag.
+//! Decoder of CDR, the encoding of ROS 2 messages, and the message types that are read from a bag.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-/// A message that cannot be decoded: what was expected.
+/// Reason for which a message cannot be decoded.
 pub(super) type Fault = String;
 
 /// Bytes of a message, read from front to back.
@@ -12,21 +12,21 @@ pub(super) struct Cdr<'a> {
     little: bool,
 }
 
-/// Stamp and frame of a message.
+/// Time stamp and coordinate frame of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Header {
     pub stamp_s: f64,
     pub frame: String,
 }
 
-/// `sensor_msgs/Image`, without its pixels copied.
+/// `sensor_msgs/Image`; its pixels are borrowed from the message.
 pub(super) struct Image<'a> {
     pub header: Header,
     pub width: usize,
     pub height: usize,
     pub encoding: String,
     pub big_endian: bool,
-    /// Bytes of a row.
+    /// Length of a row, bytes.
     pub step: usize,
     pub data: &'a [u8],
 }
@@ -38,7 +38,7 @@ pub(super) struct Compressed<'a> {
     pub data: &'a [u8],
 }
 
-/// `sensor_msgs/CameraInfo`, as far as it is used.
+/// `sensor_msgs/CameraInfo`, as far as needed here.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct CameraInfo {
     pub header: Header,

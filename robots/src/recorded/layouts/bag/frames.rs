@@ -1,14 +1,14 @@
-//! Pixels of image messages.
+//! Decoding of the pixels of image messages.
 
 use super::cdr::{Cdr, Image};
 use crate::input::InputError;
 use crate::recorded::picture::{self, RawDepth};
 use image::RgbImage;
 
-/// Length of the head of `compressedDepth` before its PNG: a format and two numbers.
+/// Length of the head of `compressedDepth` before its PNG, bytes: a format and two numbers.
 const HEAD: usize = 12;
 
-/// Contents of an image.
+/// Content of an image message, with the unit of depths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     DepthMillimetres,
@@ -16,7 +16,7 @@ pub(super) enum Kind {
     Colour,
 }
 
-/// Contents of an image of an encoding; none of what is neither depth nor colour.
+/// Content of an image message with this encoding; `None` if it is neither depth nor colour.
 pub(super) fn kind_of(encoding: &str) -> Option<Kind> {
     match encoding {
         "16UC1" | "mono16" => Some(Kind::DepthMillimetres),
@@ -25,7 +25,7 @@ pub(super) fn kind_of(encoding: &str) -> Option<Kind> {
     }
 }
 
-/// Contents of a compressed image.
+/// Content of a compressed image message with this format.
 pub(super) fn kind_of_compressed(format: &str) -> Kind {
     match (format.contains("compressedDepth"), format.contains("32FC1")) {
         (true, true) => Kind::DepthMetres,
@@ -34,7 +34,8 @@ pub(super) fn kind_of_compressed(format: &str) -> Kind {
     }
 }
 
-/// Bytes of a pixel, and where red, green and blue are among them.
+/// Bytes of a pixel, and the offsets of red, green and blue among them; `None` for an encoding without
+/// colour.
 fn channels(encoding: &str) -> Option<(usize, [usize; 3])> {
     match encoding {
         "rgb8" => Some((3, [0, 1, 2])),
@@ -50,7 +51,7 @@ fn broken(place: &str, problem: impl Into<String>) -> InputError {
     InputError::whole(place, problem, "the message is damaged, or its driver writes it otherwise")
 }
 
-/// Depth of a message.
+/// Decodes the depth image of a message, in the unit that its [`Kind`] names.
 pub(super) fn depth(place: &str, data: &[u8], compressed: bool) -> Result<RawDepth, InputError> {
     let read = |fault: String| broken(place, fault);
     if !compressed {
@@ -88,7 +89,7 @@ fn raw_depth(place: &str, image: &Image<'_>) -> Result<RawDepth, InputError> {
     Ok(RawDepth { width: image.width, height: image.height, units })
 }
 
-/// Pixels of so many bytes, row by row.
+/// Pixels of an image, row by row, each as a slice of `size` bytes.
 fn rows<'a>(
     place: &str,
     image: &Image<'a>,
@@ -103,7 +104,7 @@ fn rows<'a>(
     Ok(data.chunks_exact(step).take(height).flat_map(move |line| line[..row].chunks_exact(size)))
 }
 
-/// Colour of a message.
+/// Decodes the colour image of a message.
 pub(super) fn colour(place: &str, data: &[u8], compressed: bool) -> Result<RgbImage, InputError> {
     let read = |fault: String| broken(place, fault);
     if compressed {

@@ -1,4 +1,4 @@
-//! Messages of a bag, gathered in one walk, and the topics that are read.
+//! One pass through a bag that collects its messages, and the choice of topics.
 
 use super::cdr::{self, CameraInfo, Cdr};
 use super::transforms::Transforms;
@@ -16,7 +16,7 @@ const COMPRESSED: &str = "sensor_msgs/msg/CompressedImage";
 const CAMERA: &str = "sensor_msgs/msg/CameraInfo";
 const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 
-/// Stamped image of a topic: the file that holds it, and its place there.
+/// A stored image: its time stamp, the index of the file that holds it, and its place in that file.
 #[derive(Clone, Debug)]
 pub(super) struct Stored {
     pub(super) stamp_s: f64,
@@ -24,17 +24,17 @@ pub(super) struct Stored {
     pub(super) place: Place,
 }
 
-/// Messages that one walk through a bag gathers.
+/// Transforms, cameras and images that one pass through a bag collects.
 #[derive(Default)]
 pub(super) struct Gathered {
     pub(super) transforms: Transforms,
-    /// First camera of each topic.
+    /// First `CameraInfo` of each topic, by topic.
     pub(super) cameras: BTreeMap<String, CameraInfo>,
-    /// The images of each topic.
+    /// Images of each topic, by topic.
     pub(super) images: BTreeMap<String, Shown>,
 }
 
-/// Images of a topic.
+/// Images of one topic: content, coordinate frame, size in columns and rows, and where each is stored.
 pub(super) struct Shown {
     pub(super) kind: frames::Kind,
     pub(super) frame: String,
@@ -109,7 +109,7 @@ impl Gathered {
     }
 }
 
-/// The topic of depth images: the one that was asked for, or the only one.
+/// Chooses the topic of depth images: the requested one, or else the only one; uncompressed topics go first.
 pub(super) fn choose<'a>(
     path: &Path,
     gathered: &'a Gathered,
@@ -140,7 +140,8 @@ pub(super) fn choose<'a>(
     }
 }
 
-/// Camera of a topic: that of `camera_info` beside it, or the only one of its frame.
+/// Camera of a depth topic: the one that the user gives, or that of `camera_info` beside the topic, or one
+/// with the same coordinate frame and size.
 pub(super) fn camera(
     path: &Path,
     gathered: &Gathered,

@@ -17,7 +17,7 @@ const CHUNK: u8 = 6;
 const DATA_END: u8 = 15;
 /// Maximum size of an unpacked chunk, bytes. From: chosen.
 const MOST_CHUNK: u64 = 1 << 30;
-/// Place of a message outside of chunks.
+/// Marks a message outside of chunks, in place of its offset in a chunk.
 const OUTSIDE: u64 = u64::MAX;
 
 pub(super) struct Mcap {
@@ -25,11 +25,11 @@ pub(super) struct Mcap {
     file: BufReader<File>,
     length: u64,
     topics: BTreeMap<u16, Topic>,
-    /// The chunk that was unpacked last, by its offset.
+    /// Records of the chunk that was unpacked last, with the offset of the chunk in the file.
     unpacked: Option<(u64, Arc<Vec<u8>>)>,
 }
 
-/// A part of a record, read from front to back.
+/// Bytes of a record, read from front to back.
 struct Part<'a>(&'a [u8]);
 
 impl<'a> Part<'a> {
@@ -56,7 +56,7 @@ impl<'a> Part<'a> {
         String::from_utf8(self.take(length)?.to_vec()).ok()
     }
 
-    /// Next record: its kind and its content.
+    /// Next record: its opcode and its content; `None` if the bytes end within it.
     fn record(&mut self) -> Option<(u8, &'a [u8])> {
         let kind = *self.take(1)?.first()?;
         let length = usize::try_from(self.u64()?).ok()?;
@@ -64,7 +64,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Definitions of channels, gathered from records.
+/// Schemas and channels of the file, collected from records.
 #[derive(Default)]
 struct Channels {
     schemas: BTreeMap<u16, String>,
@@ -126,7 +126,7 @@ impl Mcap {
         )
     }
 
-    /// Content of the record at an offset, and the offset of the next.
+    /// Opcode and content of the record at an offset of the file, and the offset of the next record.
     fn record_at(&mut self, offset: u64) -> Result<(u8, Vec<u8>, u64), InputError> {
         let mut head = [0; 9];
         let read = self.file.seek(SeekFrom::Start(offset)).and_then(|_| self.file.read_exact(&mut head));
@@ -143,7 +143,7 @@ impl Mcap {
         }
     }
 
-    /// Unpacks the records of a chunk.
+    /// Decompresses the records of a chunk.
     fn unpack(&self, offset: u64, content: &[u8]) -> Result<Vec<u8>, InputError> {
         let mut part = Part(content);
         let head = (|| {
@@ -187,7 +187,8 @@ impl Mcap {
         Ok(records)
     }
 
-    /// Calls `see` with the offset of the chunk, the place in it, the kind and the content of every record of the data.
+    /// Calls `see` for every record of the data with four values: the offset of its chunk (or its own,
+    /// outside of chunks), its offset in the chunk (or [`OUTSIDE`]), opcode and content.
     fn walk(
         &mut self,
         see: &mut dyn FnMut(u64, u64, u8, &[u8]) -> Result<(), InputError>,
@@ -216,7 +217,7 @@ impl Mcap {
     }
 }
 
-/// Head of a message before its data: channel, sequence and two times.
+/// Length of a message's fields before its data, bytes: channel, sequence and two times.
 const HEAD: usize = 2 + 4 + 8 + 8;
 
 impl Messages for Mcap {

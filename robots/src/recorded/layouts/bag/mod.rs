@@ -17,36 +17,36 @@ use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Maximum difference of the stamps of depth and colour, seconds. From: chosen, a frame at 20 Hz.
+/// Maximum difference between the stamps of depth and colour images, seconds. From: chosen, a frame at 20 Hz.
 const BESIDE_S: f64 = 0.05;
-/// Frames in which z is up. From: REP 105.
+/// Names of frames in which z is up. From: REP 105.
 const UPRIGHT: [&str; 3] = ["map", "odom", "world"];
 
 /// A topic of a bag.
 #[derive(Clone, Debug, PartialEq)]
 struct Topic {
     name: String,
-    /// Type of its messages.
+    /// Message type, such as `sensor_msgs/msg/Image`.
     kind: String,
     encoding: String,
 }
 
-/// Place of a message in its file.
+/// Place of a message in its file, as two numbers that only the reader of the file's format interprets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Place(u64, u64);
 
-/// A message as it is met.
+/// A message during a pass through a bag.
 struct Message<'a> {
     topic: &'a Topic,
     place: Place,
     data: &'a [u8],
 }
 
-/// A file of a bag.
+/// Reader of one file of a bag.
 trait Messages: Send {
     fn topics(&self) -> Vec<Topic>;
 
-    /// Shows all messages of some topics.
+    /// Passes every message of the wanted topics to `see`.
     fn each(
         &mut self,
         wanted: &dyn Fn(&Topic) -> bool,
@@ -147,14 +147,14 @@ fn nearest(stored: &[Stored], stamp_s: f64) -> Option<&Stored> {
 
 struct BagImages {
     bags: Mutex<Vec<(PathBuf, Box<dyn Messages>)>>,
-    /// Depth and colour of each frame.
+    /// Places of the depth image of each frame, and of the colour image nearest in time, if any.
     stored: Vec<(Stored, Option<Stored>)>,
-    /// True for those that are compressed: depth, colour.
+    /// True if the depth images are compressed, and true if the colour images are.
     compressed: (bool, bool),
 }
 
 impl BagImages {
-    /// Place of a message for people, and its data.
+    /// Name for people of a stored image, and the data of its message.
     fn message(&self, stored: &Stored) -> Result<(String, Vec<u8>), InputError> {
         let mut bags = self.bags.lock().unwrap_or_else(PoisonError::into_inner);
         let (path, bag) = &mut bags[stored.file];

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// Longest gap of a transform across which it is interpolated, seconds. From: chosen.
 const GAP_S: f64 = 1.0;
 
-/// Transforms by child.
+/// Transforms by child frame, with the parent frame: fixed ones, and moving ones in order of time, seconds.
 #[derive(Default)]
 pub(super) struct Transforms {
     fixed: BTreeMap<String, (String, Isometry3<f64>)>,
@@ -36,7 +36,7 @@ impl Transforms {
         moving.or_else(|| self.fixed.get(frame).map(|(parent, _)| parent.as_str()))
     }
 
-    /// The frame at the root of the tree that holds this one; none if the frame is in no tree, or goes round.
+    /// Root of the tree that holds a frame; `None` if the frame has no parent, or its ancestors form a cycle.
     pub(super) fn root<'a>(&'a self, frame: &'a str) -> Option<&'a str> {
         let mut at = self.parent(frame)?;
         for _ in 0..self.moving.len() + self.fixed.len() {
@@ -48,7 +48,8 @@ impl Transforms {
         None
     }
 
-    /// Pose of a frame in the root of its tree at a time; none where a transform of that time is missing.
+    /// Pose of a frame in the root of its tree at a time, seconds; `None` where a transform of that time is
+    /// missing.
     pub(super) fn root_from(&self, frame: &str, stamp_s: f64) -> Option<Isometry3<f64>> {
         self.root(frame)?;
         let mut root_from_frame = Isometry3::identity();
@@ -65,7 +66,7 @@ impl Transforms {
         Some(root_from_frame)
     }
 
-    /// Names of all frames.
+    /// Names of all frames that have a parent.
     pub(super) fn frames(&self) -> Vec<&str> {
         self.moving.keys().chain(self.fixed.keys()).map(String::as_str).collect()
     }

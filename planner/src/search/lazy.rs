@@ -14,7 +14,7 @@ use super::lookahead::Lookahead;
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
 
-/// Priority boost of preferred operators when a heuristic makes progress.
+/// Number of extra turns for open lists of preferred operators when a heuristic makes progress.
 const BOOST: i64 = 1000;
 
 /// Configuration of a lazy best-first search.

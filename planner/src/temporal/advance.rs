@@ -397,7 +397,7 @@ impl<'w, 'a> Accesses<'w, 'a> {
     }
 }
 
-/// Collector of the resources that one happening accesses at a time.
+/// Collector of the resources that a happening accesses, used for one happening after the other.
 struct Watch<'w, 'a> {
     world: &'w World<'a>,
     /// Basic resources behind each derived variable; empty for other variables.

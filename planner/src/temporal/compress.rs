@@ -104,7 +104,7 @@ pub fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     Some((task, parts))
 }
 
-/// Value of the variable that says if a split action is running, while it is not.
+/// Value "not running" of the variable that says if a split action is running.
 const IDLE: u32 = 1;
 
 /// Start and end of a split action as two classical actions; the fact `running` holds in between.

@@ -1,5 +1,5 @@
-//! Actions whose start and end must be separate steps in the search, because others have to happen in
-//! between (required concurrency).
+//! Actions whose start and end must be separate steps in the search, because other actions have to
+//! happen in between (required concurrency).
 
 use std::collections::BTreeSet;
 
@@ -29,10 +29,10 @@ pub fn all_apart(world: &World) -> Vec<bool> {
     world.acts.iter().map(|act| act.durative).collect()
 }
 
-/// Actions that must not overlap themselves, if every plan can be rearranged into a sequence of
-/// compressed actions; `None` if this is not known. The condition: no timed literals, and every action
-/// can delay its start until just before its end, or end right after its start, whatever happens in
-/// between (compare the compression-safe actions of Coles et al. 2009).
+/// Checks that every plan can be rearranged into a sequence of compressed actions. Returns the actions
+/// for which this holds only if they do not overlap themselves; `None` if it is not known to hold. The
+/// condition: no timed literals, and every action can delay its start until just before its end, or end
+/// right after its start (compare the compression-safe actions of Coles et al. 2009).
 pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     if !world.ground.timed.is_empty() {
         return None;
@@ -112,7 +112,7 @@ fn plain(effect: &GroundEffect) -> Option<GroundFact> {
 }
 
 /// True if only one action at a time can change a variable: every writer sets the variable at its start
-/// to the same value, which no condition needs and from which no writer can start.
+/// to the same value, which no condition needs and in which no writer can start.
 fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> bool {
     let between = |writer: &u32| {
         let act = &world.acts[*writer as usize];

@@ -53,12 +53,12 @@ pub(super) struct Work {
     wanted: Vec<bool>,
     /// Progress of each operator that has more than one precondition.
     waiting: Vec<Waiting>,
-    /// Label of the preconditions, and own cost, of each operator that was used.
+    /// Label (cost or time) of the preconditions, and own cost, of each operator that was used.
     fired: Vec<(f64, f64)>,
     queue: BinaryHeap<Reverse<(Key, u32)>>,
     evaluation: u32,
     goal: Vec<u32>,
-    /// Greatest label among the goals; recomputed if `nearer` is true.
+    /// Greatest label (cost or time) among the goals; recomputed if `nearer` is true.
     latest: f64,
     nearer: bool,
     /// Lower bounds from each proposition to the goal, in costs and in seconds; empty until needed.
@@ -112,7 +112,7 @@ impl Work {
         (waiting.missing == 0).then_some(waiting.base)
     }
 
-    /// Greatest label among the goals; propositions with greater labels are useless.
+    /// Greatest label (cost or time) among the goals; propositions with greater labels are useless.
     fn latest(&mut self) -> f64 {
         if std::mem::take(&mut self.nearer) {
             let labels = self.goal.iter().map(|&need| self.labels[need as usize]);
@@ -142,7 +142,7 @@ impl Work {
     }
 }
 
-/// Label with a total order, for priority queues.
+/// Label (cost or time) with a total order, for priority queues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Key(pub(super) f64);
 

@@ -74,10 +74,10 @@ pub(crate) enum Reason {
     Memory,
 }
 
-/// Effort of improving a plan without `anytime`, in evaluated states times actions, for each share of
-/// its steps.
+/// Effort of improving a plan without `anytime`, in evaluated states times actions, per
+/// [`STEPS_PER_SHARE`] steps of the plan.
 const IMPROVEMENT_WORK: u64 = 2_000_000;
-/// Number of steps of a plan that add one share of that effort.
+/// Number of plan steps for which the effort of improvement grows by [`IMPROVEMENT_WORK`].
 const STEPS_PER_SHARE: u64 = 16;
 /// Minimum effort of improving a plan without `anytime`, as a multiple of the states evaluated for the
 /// first plan.
@@ -93,11 +93,11 @@ const WEIGHTS: [f64; 2] = [3.0, 1.0];
 const FIRST_TRY: (u64, u64) = (50, 500);
 /// Effort of each first, short search for a plan, in evaluated states times actions.
 const FIRST_WORK: u64 = 2_000_000;
-/// Minimum limit of evaluations of a search with self-overlapping actions.
+/// Minimum number of evaluations granted to a search with self-overlapping actions.
 const LEAST_OVERLAPPED: u64 = 2_000;
 /// Number of evaluations of a search for a first plan before linear programs are tried.
 const SHORT: u64 = 500;
-/// Minimum limit of evaluations of one repair in the large neighbourhood search.
+/// Minimum number of evaluations granted to one repair in the large neighbourhood search.
 const REPAIR: u64 = 200;
 
 /// Searches for plans; `on_plan` gets every better plan.

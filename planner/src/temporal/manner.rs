@@ -14,8 +14,8 @@ pub(crate) struct Manner {
     /// True if the heuristic estimates time, counted from when resources are free; false if it adds
     /// costs.
     pub timed: bool,
-    /// True to follow the relaxed plan of every state, false only of states that improve on all earlier
-    /// ones.
+    /// True to follow the relaxed plan of every state; false to follow only those of states that improve
+    /// on all earlier ones.
     pub eager: bool,
     /// Only plans with a measure below this bound are accepted.
     pub bound: f64,
@@ -27,8 +27,8 @@ pub(crate) struct Manner {
     pub memory: MemoryLimit,
     /// Seed of the order among open-list entries of equal rank; 0 for oldest first.
     pub shuffle: u64,
-    /// True to distinguish states with equal facts but different temporal options; exhaustion is then a
-    /// proof.
+    /// True to distinguish states with equal facts after which different times are possible; exhaustion is
+    /// then a proof.
     pub exact: bool,
     /// Maximum number of instances of one action that are in progress at once.
     pub at_once: usize,

@@ -32,11 +32,11 @@ type Place = (bool, u32);
 /// argument objects.
 type Name = (bool, u32, Vec<u32>);
 
-/// In place of arguments: all instances of a predicate or function.
+/// Stands, in place of arguments, for all instances of a predicate or function.
 const ALL: u32 = u32::MAX;
-/// In place of arguments: one instance that depends on the state.
+/// Stands, in place of arguments, for one instance that depends on the state.
 const SOME: u32 = u32::MAX - 1;
-/// In place of a step: a timed literal.
+/// Stands, in place of a step, for a timed literal.
 const GIVEN: usize = usize::MAX;
 
 /// Way in which a happening uses an atom or number.
@@ -45,7 +45,7 @@ enum Use {
     Mentions,
     Adds,
     Deletes,
-    /// Adds or deletes an instance that depends on the state, or one among all instances.
+    /// Adds or deletes some instance of a predicate or function, no matter which.
     Changes,
     /// Assigns a number; excludes every other use at the same time, including another assignment.
     Writes,

@@ -3,8 +3,9 @@
 //! PDDL 2.1 allows this, and it makes planning harder: deciding whether a plan exists needs polynomial
 //! space without self-overlap, exponential space with it if ends are kept apart, and is undecidable
 //! otherwise (Gigante, Micheli, Montanari and Scala, Decidability and complexity of action-based
-//! temporal planning over dense time, 2022). The searches therefore start no action while it is running, and record where they
-//! could have: their proofs cover only plans in which no action overlaps itself.
+//! temporal planning over dense time, 2022). The searches therefore start no action while it is
+//! running, and record where they could have: their proofs cover only plans in which no action overlaps
+//! itself.
 
 use std::collections::BTreeSet;
 

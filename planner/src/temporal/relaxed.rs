@@ -38,7 +38,7 @@ pub(super) struct Operator {
     pub(super) moves: Vec<u32>,
     /// Calls that are no tests; asked once all preconditions are reached.
     pub(super) gates: Vec<(CallId, bool)>,
-    /// Minimum duration in every state.
+    /// Minimum duration, if it is the same in every state.
     pub(super) seconds: Seconds,
 }
 
@@ -50,7 +50,7 @@ pub(super) struct Hot {
     /// Index in [`Relaxed::given`] behind the effects, where the tests begin that the operator may make
     /// true.
     pub(super) moves: u32,
-    /// Index in [`Relaxed::given`] behind those tests.
+    /// Index in [`Relaxed::given`] behind the tests that the operator may make true.
     pub(super) end: u32,
     /// Number of preconditions.
     pub(super) needs: u32,
@@ -93,14 +93,14 @@ pub(super) struct Waiter {
 pub(super) enum Seconds {
     /// The same in every state, in seconds; infinite if the action is never applicable.
     Known(f64),
-    /// The same in every state, but only known once the duration has been evaluated.
+    /// The same in every state, but unknown until it has been evaluated.
     Settled,
     /// Depends on the state.
     Depends,
 }
 
 impl Seconds {
-    /// Zero if `zero`, unless the duration depends on the state.
+    /// This duration; zero instead if `zero` is true and the duration does not depend on the state.
     fn or_zero(self, zero: bool) -> Seconds {
         if zero && self != Seconds::Depends { Seconds::Known(0.0) } else { self }
     }
@@ -576,7 +576,7 @@ fn needs_of_whole(world: &World, act: &Act) -> Merged {
     merged
 }
 
-/// Minimum duration of an action in every state.
+/// Minimum duration of an action, if it is the same in every state.
 fn seconds_of(world: &World, act: usize) -> Seconds {
     let act = &world.acts[act];
     if !act.durative {

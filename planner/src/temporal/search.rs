@@ -67,7 +67,7 @@ const WORK_A_STATE: u64 = 50;
 const MOST_UNSEEN: usize = 4096;
 /// Number of open entries that generating one state counts as, besides those that it makes.
 const UNSEEN_A_STATE: usize = 64;
-/// Priority of the queue of preferred steps after progress (Richter and Westphal 2010).
+/// Number of extra turns for the queue of preferred steps after progress (Richter and Westphal 2010).
 const BOOST: i64 = 1000;
 
 /// Part of a state's key for an action in progress: action, proposal, bits of its shortest duration,
@@ -77,7 +77,7 @@ type OpenKey = (u32, Option<Arc<str>>, u64, Gates);
 /// Actions in progress, and number of past timed literals.
 type Phase = (Vec<Open>, usize);
 
-/// One temporal search from a base.
+/// One temporal search, which starts from the situation after the steps of a base.
 pub(crate) struct Search<'s, 'w, 'a> {
     space: &'s Space<'w, 'a>,
     relaxed: &'s mut Relaxed,
@@ -89,7 +89,7 @@ pub(crate) struct Search<'s, 'w, 'a> {
     costs: Rows<f64>,
     phases: Rows<Phase>,
     phase_ids: FxHashMap<(Vec<OpenKey>, usize), u32>,
-    /// Number of actions in progress, summed over all phases.
+    /// Number of actions in progress, summed over all entries of `phases`.
     opened: usize,
     mark_ids: FxHashMap<u64, u32>,
     proposals: Vec<Arc<str>>,

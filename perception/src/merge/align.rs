@@ -1,4 +1,5 @@
-//! Alignment of all views, steps 3 and 4 of the paper: with everything, then with the objects; who contradicts the others is left out.
+//! Alignment of all views, steps 3 and 4 of the paper: by all points, then by the objects; views
+//! that contradict the others are left out.
 
 use super::check::{self, Misfit};
 use super::joint::{self, Found, Round};
@@ -11,7 +12,8 @@ use crate::scale::SPREADS;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
-/// First alignment: everything, from far to near (the table weighs most; paper step 3). From: chosen.
+/// First alignment (paper step 3): all points, from far to near correspondences; the table weighs
+/// most. From: chosen.
 pub(super) const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 800, rest_weight: 1.0 };
 
 /// First alignment with a wider search, if a view would otherwise be left out: localisation may be
@@ -23,20 +25,22 @@ pub(super) const WIDE: Round = Round { from_m: 0.3, passes: 12, asked: 900, ..FI
 pub(super) const SECOND: Round =
     Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 1200, rest_weight: 0.2 };
 
-/// Alignment after a view was left out, in which the rest settles again. From: chosen.
+/// Alignment of the remaining views after one was left out. From: chosen.
 const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200, rest_weight: 0.2 };
 
-/// Views brought together: steps 3 and 4.
+/// Result of aligning all views (steps 3 and 4), with an entry per view.
 #[derive(Debug)]
 pub(super) struct Aligned {
+    /// Aligned pose of each camera in the world.
     pub poses: Vec<Isometry3<f64>>,
     pub used: Vec<bool>,
     /// Reason each unused view is left out.
     pub whys: Vec<Option<Misfit>>,
+    /// Result of the last alignment of each view.
     pub found: Vec<Found>,
     /// The dominant planes that are level, world frame.
     pub planes: Vec<Plane>,
-    /// The part that each point belongs to.
+    /// Part of the scene that each point belongs to.
     pub parts: Parts,
     pub steps: Vec<Step>,
 }
@@ -47,7 +51,7 @@ impl Aligned {
     }
 }
 
-/// Steps 3 and 4; with a wider search if a view would otherwise be left out.
+/// Carries out steps 3 and 4, with a wider search if a view would otherwise be left out.
 pub(super) fn place(
     prepared: &[Prepared],
     maps: &[Option<DepthMap>],
@@ -65,7 +69,7 @@ pub(super) fn place(
     aligned
 }
 
-/// Steps 3 and 4 from the stated poses.
+/// Carries out steps 3 and 4 from the stated poses.
 fn align(
     prepared: &[Prepared],
     maps: &[Option<DepthMap>],
@@ -85,7 +89,7 @@ fn align(
     Aligned { poses, used, whys, found, planes, parts, steps }
 }
 
-/// Step 3: all points; the table levels the views.
+/// Carries out step 3: alignment by all points, in which the table levels the views.
 fn align_everything(
     prepared: &[Prepared],
     used: &[bool],
@@ -109,12 +113,13 @@ fn aligned(name: &str, found: &[Found]) -> Step {
     }
 }
 
-/// Localisation errors as stated: looseness 1 for each view.
+/// Looseness 1 for each view: localisation errors as stated.
 pub(super) fn as_stated(prepared: &[Prepared]) -> Vec<f64> {
     vec![1.0; prepared.len()]
 }
 
-/// Step 4, second half: the objects decide; views that contradict the others are left out one by one.
+/// Carries out the second half of step 4: alignment by the objects; views that contradict the
+/// others are left out one by one.
 #[allow(clippy::too_many_arguments)]
 fn align_objects(
     prepared: &[Prepared],
@@ -217,13 +222,14 @@ impl Objects<'_> {
         }
     }
 
-    /// Points and normals of some views, in the world.
+    /// Object points and normals of some views, world frame.
     pub fn of_all(&self, views: &[usize], poses: &[Isometry3<f64>]) -> Vec<Oriented> {
         views.iter().flat_map(|&i| objects(&self.prepared[i], &self.parts[i], &poses[i])).collect()
     }
 
-    /// Places a view's objects onto placed ones by search from its levelled pose; skipped if the
-    /// current pose already fits better, or less than the minimum share would match.
+    /// Places the objects of a view onto placed ones by search from its levelled pose; keeps the
+    /// current pose if that fits better, or if less than `least_share` of the points would match.
+    /// `loose`: factor on the search window.
     pub fn place_on(
         &self,
         (view, loose, least_share): (usize, f64, f64),
@@ -251,15 +257,17 @@ pub(super) fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) ->
     standing.map(|k| (pose * view.points[k].at(), pose.rotation * view.points[k].normal())).collect()
 }
 
-/// Search window of two views from their pose uncertainty at the objects' distance: three standard
+/// Search window of a view from its pose uncertainty at the objects' distance: three standard
 /// deviations, at least the 10 cm and 6° of a poor localisation.
 fn window(view: &Prepared, loose: f64, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
-    /// Minimum and maximum rotation, radians, and shift, metres, of the search window; the maximum
-    /// shift includes the effect of rotation. From: chosen, 6° to 8°.
+    /// Minimum and maximum rotation of the search window, radians. From: chosen, 6° to 8°.
     const TURNS_RAD: (f64, f64) = (0.105, 0.14);
+    /// Minimum and maximum shift of the search window, without the effect of rotation, metres.
+    /// From: chosen.
     const SHIFTS_M: (f64, f64) = (0.10, 0.14);
+    /// Maximum shift of the search window, with the effect of rotation, metres. From: chosen.
     const WIDEST_M: f64 = 0.3;
-    /// Objects are taken to be no farther, metres. From: chosen.
+    /// Limit of the assumed distance of the objects, metres. From: chosen.
     const FARTHEST_M: f64 = 3.0;
     /// Factor on the search range of the rotation. From: chosen.
     const WIDER: f64 = 1.2;
@@ -278,7 +286,7 @@ pub(super) fn visibility(maps: Vec<Option<DepthMap>>, used: &[bool], poses: &[Is
     Visibility { maps: maps.into_iter().zip(used).zip(poses).filter_map(placed).collect(), held: true }
 }
 
-/// The fits of all views; takes the words of why views were left out.
+/// Fit of each view; moves the reasons for leaving views out from `aligned`.
 pub(super) fn fits(prepared: &[Prepared], aligned: &mut Aligned) -> Vec<ViewFit> {
     let Aligned { poses, used, found, whys, .. } = aligned;
     (0..prepared.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect()

@@ -24,11 +24,11 @@ const MOST_CONTRADICTED: f64 = 0.22;
 pub(super) enum Misfit {
     /// The view has no usable point in range.
     Empty,
-    /// Too few points shared with the others: their number.
+    /// The view shares too few points with the others: their number.
     Alone(usize),
     /// The required correction exceeds the localisation error, metres and radians.
     Far(f64, f64),
-    /// Share of the view that contradicts free space seen by the others.
+    /// The view contradicts free space seen by the others: share of its points.
     Contradicted(f64),
 }
 
@@ -88,8 +88,8 @@ pub(super) fn misfit(
     (share > MOST_CONTRADICTED).then_some((worst, Misfit::Contradicted(share)))
 }
 
-/// Tests whether a further view of a given looseness is consistent with the used views at their
-/// poses, itself included.
+/// True if a further view with looseness `loose` is consistent with the used views at their poses;
+/// `used` includes the further view.
 pub(super) fn belongs(
     (view, loose, used): (usize, f64, &[bool]),
     views: &[Prepared],
@@ -104,8 +104,8 @@ pub(super) fn belongs(
         && contradicted(view, &all, views, parts, poses, maps) <= MOST_CONTRADICTED
 }
 
-/// Share of a view's points, and of the others' points, that contradict the other: mean over the
-/// other views. With one other view only, the mean over those that can judge.
+/// Mean, over the other views that can judge, of the larger of two shares: this view's points that
+/// contradict the other view, and the other view's points that contradict this one.
 fn contradicted(
     i: usize,
     active: &[usize],
@@ -124,13 +124,13 @@ fn contradicted(
     sum / f64::from(n.max(1))
 }
 
-/// Correction of a camera pose relative to the maximum plausible one, with the misfit; `None` if
-/// plausible.
+/// Correction of a camera pose as a multiple of the maximum plausible one, with the misfit; `None`
+/// if plausible.
 fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, Misfit)> {
-    /// Maximum accepted pose correction, in standard deviations of localisation, or in metres and
-    /// radians if larger: stated errors are sometimes too small, and 10 cm and 6° must be
-    /// corrected. From: chosen.
+    /// Maximum accepted pose correction, in standard deviations of localisation. From: chosen.
     const SPREADS: f64 = 5.0;
+    /// Pose correction that is always accepted, metres and radians: stated errors are sometimes too
+    /// small, and 10 cm and 6° must be corrected. From: chosen.
     const MENDED: (f64, f64) = (0.2, 0.2);
     let most = [(view.sigma_m, MENDED.0), (view.sigma_rad, MENDED.1)];
     let most = most.map(|(sigma, mended)| loose * (SPREADS * sigma).max(mended));
@@ -139,8 +139,8 @@ fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, M
     (excess > 1.0).then(|| (excess, Misfit::Far(shift.norm(), turn.norm())))
 }
 
-/// Share of a view's object points through which another camera looked, of those that this camera
-/// can judge; `None` if it can judge too few.
+/// Share of a view's object points through which another camera looked, of those that the other
+/// camera can judge; `None` if those are too few.
 fn contradiction(
     view: &Prepared,
     parts: &[Part],
@@ -148,7 +148,7 @@ fn contradiction(
     map: Option<&DepthMap>,
     map_pose: &Isometry3<f64>,
 ) -> Option<f64> {
-    /// Points of a view that another camera is asked about. From: chosen.
+    /// Approximate number of a view's points that are tested in another camera. From: chosen.
     const ASKED: usize = 300;
     /// Minimum number of points to judge. From: chosen.
     const FEWEST: u32 = 25;

@@ -16,9 +16,11 @@ use std::ops::Range;
 /// Depth difference to both neighbours, one nearer and one farther, from which a return is a mixed
 /// pixel, as a share of its depth. From: chosen.
 const FLYING_SHARE: f32 = 0.02;
-/// Maximum distance of a return on a plane, in standard deviations and in metres (the larger
-/// counts). From: derived, as far as a plane is taken to be measured where it is sought.
+/// Maximum distance of a return from its plane: this many standard deviations plus [`PLANE_M`].
+/// From: derived, as far as a plane is taken to be measured where it is sought.
 const PLANE_SPREADS: f32 = BAND.0 as f32;
+/// Maximum distance of a return from its plane, metres, beyond [`PLANE_SPREADS`] standard
+/// deviations. From: derived, as far as a plane is taken to be measured where it is sought.
 const PLANE_M: f32 = BAND.1 as f32;
 /// Minimum cosine between a return's normal and its plane's. From: derived, as where the planes are
 /// told from what stands on them.
@@ -31,11 +33,12 @@ const FINE: OrganisedOptions = OrganisedOptions { reach: 1, depth_step_share: 0.
 
 /// Number of returns processed together in a cloud without rows. From: work.
 const ROW: usize = 512;
-/// Pixels that are judged together. From: work.
+/// Number of pixels processed together (SIMD lanes). From: work.
 const LANES: usize = 16;
 
-/// Mark of a return instead of a plane number: not fused, or off the planes. From: mark.
+/// Mark, in place of a plane number, of a return that is not fused. From: mark.
 const DROPPED: u32 = u32::MAX;
+/// Mark, in place of a plane number, of a return off the planes. From: mark.
 const THING: u32 = u32::MAX - 1;
 
 /// A return that is fused.
@@ -47,6 +50,7 @@ pub(super) struct DepthSample {
     pub normal: Vector3<f32>,
     /// Inverse variance, per square metre.
     pub weight: f32,
+    /// Index of the return's pixel in the view.
     pub pixel: u32,
 }
 
@@ -74,7 +78,7 @@ impl Looked {
         Looked(pool::each(rows.div_ceil(ROWS), 1, |n| look(n * ROWS)))
     }
 
-    /// True if the returns were assigned to as many planes.
+    /// True if the returns were assigned to as many planes as given.
     pub fn is_with(&self, planes: &[Plane]) -> bool {
         self.0.iter().all(|found| found.len() == 1 + planes.len())
     }
@@ -90,18 +94,21 @@ struct DepthSamples<'a> {
     view: &'a View,
     within: Within,
     organised: bool,
-    /// Pixels a row.
+    /// Number of pixels per row.
     width: usize,
     planes: Vec<InCamera>,
     /// Plane number of each pixel of the coarser copy, or [`THING`].
     on: Vec<u32>,
+    /// Normals for returns on planes.
     coarse: Facing<'a>,
+    /// Normals for returns off the planes.
     things: Facing<'a>,
 }
 
 /// A plane in the camera's frame, metres.
 struct InCamera {
     normal: Vector3<f32>,
+    /// Distance of the plane from the camera along the normal, metres.
     along_m: f32,
 }
 
@@ -117,8 +124,9 @@ impl InCamera {
 /// Normals (camera frame) of some of a view's pixels: of every nth row and column.
 struct Facing<'a> {
     normals: Cow<'a, [Vector3<f32>]>,
-    /// Index of the first normal of each row, and column offset within a row.
+    /// Index in `normals` of the first normal for each row of pixels.
     rows: Vec<usize>,
+    /// Offset in a row of normals for each column of pixels.
     columns: Vec<usize>,
 }
 
@@ -176,14 +184,15 @@ impl<'a> DepthSamples<'a> {
         }
     }
 
-    /// Row of pixels, or a chunk of as many points; empty after the last.
+    /// Points of a row of pixels, or a chunk of [`ROW`] points of a cloud without rows; empty after
+    /// the last.
     fn line(&self, row: usize) -> &[Point3<f32>] {
         let points = &self.view.cloud.points;
         &points[points.len().min(row * self.width)..points.len().min((row + 1) * self.width)]
     }
 
     /// Calls `found` for the returns of some rows in range, height band and region, without mixed
-    /// pixels, each with its plane number plus one, or zero.
+    /// pixels, each with its plane number plus one, or 0 off the planes.
     fn visit(&self, rows: Range<usize>, mut found: impl FnMut(usize, DepthSample)) {
         let mut lines: [Line; 3] = std::array::from_fn(|_| Line::of(self.width));
         if let Some(before) = rows.start.checked_sub(1) {
@@ -210,7 +219,7 @@ impl<'a> DepthSamples<'a> {
         }
     }
 
-    /// Block of pixels in the middle of three rows; `None` if none is fused.
+    /// Block of pixels of the middle of three rows; `None` if none is fused.
     fn block(&self, lines: &[Line; 3], row: usize, column: usize) -> Option<Block> {
         let [x, y, z] = [0, 1, 2].map(|axis| some(&lines[1].0[axis], column + 1));
         let mut block = Block { at: [*x, *y, *z], weight: [0.0; LANES], on: [DROPPED; LANES] };
@@ -253,7 +262,7 @@ impl<'a> DepthSamples<'a> {
         Some(block)
     }
 
-    /// Planes that some pixels may lie on.
+    /// Plane on which each pixel of a block may lie by the coarser copy, or [`THING`].
     fn around(&self, row: usize, column: usize) -> [u32; LANES] {
         let mut around = [THING; LANES];
         for (on, column) in around.iter_mut().zip(&self.coarse.columns[column..]) {
@@ -265,10 +274,11 @@ impl<'a> DepthSamples<'a> {
 
 /// Block of `LANES` neighbouring pixels, processed together (SIMD).
 struct Block {
-    /// Camera frame, metres.
+    /// Coordinates x, y and z in the camera frame, metres.
     at: [[f32; LANES]; 3],
+    /// Inverse variance, per square metre.
     weight: [f32; LANES],
-    /// Numbers of planes, [`THING`] or [`DROPPED`].
+    /// Plane number, [`THING`] or [`DROPPED`].
     on: [u32; LANES],
 }
 
@@ -280,7 +290,7 @@ impl Line {
         Line(std::array::from_fn(|_| vec![f32::NAN; width.next_multiple_of(LANES) + 2]))
     }
 
-    /// Fills the row; a row may be shorter than others.
+    /// Copies a row of points, which may be shorter than this line.
     fn fill(&mut self, row: &[Point3<f32>]) {
         for (axis, line) in self.0.iter_mut().enumerate() {
             line[1..].iter_mut().zip(row).for_each(|(c, p)| *c = p[axis]);
@@ -304,7 +314,7 @@ fn sigma_m(depth: f32, range_sq: f32) -> f32 {
     frontal_sigma_m(if depth_sq > half_sq { depth_sq } else { half_sq }.sqrt())
 }
 
-/// Plane of each point of the coarser copy.
+/// Plane number of each point of the coarser copy, or [`THING`].
 fn lying_on(cloud: &Cloud, normals: &[Vector3<f32>], within: &Within, planes: &[InCamera]) -> Vec<u32> {
     let on = |(p, normal): (&Point3<f32>, &Vector3<f32>)| {
         let at = [p.x, p.y, p.z];

@@ -9,7 +9,7 @@ pub enum MergeError {
     /// Invalid options.
     #[error("merge option `{field}` is {value}: expected {expected}")]
     Option {
-        /// The option.
+        /// Name of the option.
         field: &'static str,
         /// Value that was given.
         value: f64,

@@ -1,7 +1,8 @@
 //! Step 5: fusion into one cloud, sharper than any view and of bounded size.
 //!
-//! Returns at depth edges that hang between two surfaces are dropped. The rest are averaged in voxels, each weighted by the spread of its
-//! range. What lies on a level plane is averaged in columns that stand on it instead: the table is one sheet.
+//! Returns at depth edges that hang between two surfaces are dropped. The others are averaged in
+//! voxels, weighted by their inverse variances. Returns on a level plane are averaged in columns
+//! perpendicular to the plane instead, so that the table becomes one sheet.
 
 use super::align::Aligned;
 use super::depth_samples::{DepthSample, Looked};
@@ -20,13 +21,15 @@ use std::sync::Arc;
 /// State of a voxel: running weighted sums while gathering, then means.
 #[derive(Clone, Copy)]
 pub(super) struct Cell {
+    /// Sum of the weights of the returns, per square metre.
     pub weight: f32,
-    /// Voxels from the grid's lowest corner.
+    /// Position in voxels from the grid's lowest corner: weighted sum, or mean.
     pub at: Vector3<f32>,
-    /// Normal, of unit length or zero after settling.
+    /// Normal: weighted sum, or mean of unit length, or zero.
     pub normal: Vector3<f32>,
-    /// Number of views that measured the voxel, and the last of them.
+    /// Number of views that measured the voxel.
     pub views: u16,
+    /// Number of the last view that measured the voxel.
     last: u16,
 }
 
@@ -50,7 +53,7 @@ impl Cell {
     }
 
     pub fn mean(&self) -> Cell {
-        /// Normals that add up to less cancel out. From: rounding.
+        /// Minimum length of a sum of normals; below it, they cancel out. From: rounding.
         const CANCELLED: f32 = 1e-6;
         let normal = self.normal.try_normalize(CANCELLED).unwrap_or_else(Vector3::zeros);
         Cell { at: self.at / self.weight, normal, ..*self }
@@ -67,7 +70,9 @@ pub(super) struct Gathered {
     pub blocks: VoxelBlocks<Cell>,
     /// Weighted colour sums of each cell, if coloured.
     pub colours: Vec<Vector3<f32>>,
+    /// Number of returns in all cells.
     pub returns: usize,
+    /// Result of the last settling.
     pub before: Before,
 }
 
@@ -79,8 +84,8 @@ pub(super) struct Fused {
 }
 
 /// Gathers and settles the used views at their corrected poses, with a height sheet for each level
-/// plane. Gathered returns of the first views in `known` are reused; those of the others are added
-/// to it.
+/// plane. `known`: gathered returns of the first views, which are reused; those of the other views
+/// are appended.
 pub(super) fn gather(
     views: &[View],
     prepared: &[Prepared],
@@ -194,10 +199,11 @@ fn add(all: &mut [Gathered], some: &[Taken], then: impl Fn(&mut Gathered) + Sync
     );
 }
 
-/// Camera to grid.
+/// Transform from a camera's frame to voxels of a grid.
 struct Scale {
-    /// Voxels a metre.
+    /// Rotation into the grid's axes times the number of voxels per metre.
     turn: Matrix3<f32>,
+    /// Position of the camera, voxels from the grid's lowest corner.
     shift: Vector3<f32>,
     /// Rotation into the grid's axes, for directions.
     axes: Matrix3<f32>,
@@ -220,13 +226,13 @@ impl Scale {
         })
     }
 
-    /// Voxels from the grid's lowest corner.
+    /// Position of a return, voxels from the grid's lowest corner.
     #[inline(always)]
     fn at(&self, of: &DepthSample) -> Vector3<f32> {
         self.turn * of.at + self.shift
     }
 
-    /// Zero if unknown.
+    /// Normal of a return in the grid's axes; zero if unknown.
     #[inline(always)]
     fn normal(&self, of: &DepthSample) -> Vector3<f32> {
         if of.normal.x.is_finite() { self.axes * of.normal } else { Vector3::zeros() }
@@ -234,7 +240,7 @@ impl Scale {
 }
 
 impl Gathered {
-    /// Puts the cells in the order of their blocks.
+    /// Sorts the cells by block, and the colours with them.
     fn sort(&mut self) {
         let Some(former) = self.blocks.sort() else { return };
         if !self.colours.is_empty() {
@@ -242,7 +248,7 @@ impl Gathered {
         }
     }
 
-    /// Empty grid over the range of all cameras.
+    /// Empty grid over the range of all cameras: voxels, or columns on the plane `on`.
     fn over(
         cameras: &[Isometry3<f64>],
         on: Option<&Plane>,

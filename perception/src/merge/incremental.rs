@@ -1,11 +1,13 @@
 //! Incremental merge: a further view of the same place reuses the results of the earlier ones.
 //!
-//! What is known of a view by itself is kept as long as the view is the same. A further view alone is aligned, to the views beside it as they
-//! lie, and gathered; what it touches is settled, and the frame stays the average of what localisation said. What few views showed of where
-//! they lie among each other is little: the next ones may move them, and all are gathered anew if they do. A real camera bends what it sees, and
-//! errors of one look by one add up: few views, and whenever there are half as many more, are merged together. That need not wait for the next
-//! look, nor the next look for that: it is done ahead, while the body drives. Which views are merged together follows from the views alone,
-//! not from what was merged before: the same views give the same bytes, whatever was kept.
+//! What depends on one view alone is kept while the view is unchanged. A further view is aligned to
+//! the nearest earlier views, which stay fixed, and fused; only the voxels that it touches are
+//! settled again, and the frame stays the average of the localised poses. Few views hardly
+//! determine their poses relative to each other, so the next ones may move them; if they do, all
+//! views are fused again. Real cameras distort, and errors of single steps add up: the first views,
+//! and all views whenever there are half as many more, are merged together. That is done ahead, in
+//! a thread, while the robot drives. Which views are merged together follows from the views alone,
+//! so that the same views give the same bytes, whatever was kept.
 
 use super::align::{
     Aligned, FIRST, Objects, SECOND, WIDE, as_stated, fit, fits, objects, only_levelled, place, visibility,
@@ -65,7 +67,7 @@ struct Kept {
     base: Option<Base>,
 }
 
-/// Views that were merged.
+/// State of a merge to which a further view can be added.
 struct Base {
     digests: Vec<u64>,
     aligned: Aligned,
@@ -85,7 +87,7 @@ impl fmt::Debug for Merger {
 
 impl Merger {
     /// Result of [`merge`](super::merge) with the last view aligned to the merge of the others;
-    /// faster if these were merged before.
+    /// faster if the others were merged before.
     ///
     /// # Errors
     /// As [`merge`](super::merge).
@@ -195,7 +197,7 @@ impl Kept {
         base
     }
 
-    /// First views, together.
+    /// Merges all given views together.
     fn anew(&self, views: &[View], options: &MergeOptions) -> Result<Base, MergeError> {
         let (prepared, maps) = (&self.prepared[..views.len()], &self.maps[..views.len()]);
         let mut steps = filter_and_thin(views, prepared, options)?;
@@ -208,8 +210,8 @@ impl Kept {
         Ok(Base { digests, aligned, seen, gathered, looked, fits, steps })
     }
 
-    /// Merge of the last of the first views with the others, which stay fixed unless they are few;
-    /// `None` if it does not fit.
+    /// Adds the last view to the merge of the others, which stay fixed unless they are few; `None`
+    /// if the last view does not fit.
     fn further(&self, mut base: Base, views: &[View], options: &MergeOptions) -> Option<Base> {
         let last = views.len() - 1;
         let (prepared, maps) = (&self.prepared[..=last], &self.maps[..=last]);
@@ -276,7 +278,8 @@ impl Base {
     }
 }
 
-/// Number of first views that are merged together: few, or half as many more each time.
+/// Number of first views that are merged together: all if few, then 6, 9, 14, and so on by half as
+/// many more.
 fn together(views: usize) -> usize {
     let more = std::iter::successors(Some(FEW), |n| Some((3 * n).div_ceil(2)));
     more.take_while(|n| *n <= views).last().unwrap_or(views)
@@ -328,8 +331,8 @@ impl Aligned {
         Some(Laid { poses, found, parts: parts.pop()? })
     }
 
-    /// The displacement of the objects of a view since the alignment without the last view, metres: the
-    /// maximum over the views.
+    /// Root mean square displacement of a view's objects, relative to the first view, since the
+    /// alignment without the last view, metres: maximum over the views.
     fn moved_m(&self, prepared: &[Prepared], poses: &[Isometry3<f64>]) -> f64 {
         let last = poses.len() - 1;
         let moved = |i: usize| poses[i] * self.poses[i].inverse();
@@ -386,7 +389,7 @@ fn digest(view: &View) -> u64 {
 
 /// 64-bit hash of bytes, in four independent lanes for speed.
 fn digest_of(bytes: &[u8]) -> u64 {
-    /// Words that are mixed in side by side. From: work.
+    /// Number of words hashed side by side. From: work.
     const LANES: usize = 4;
     let (words, last) = bytes.as_chunks::<8>();
     let (rows, rest) = words.as_chunks::<LANES>();

@@ -17,9 +17,9 @@ use nalgebra::{
 pub(super) struct Round {
     /// Maximum correspondence distance at the first iteration, metres.
     pub from_m: f64,
-    /// ... and at the last.
+    /// Maximum correspondence distance at the last iteration, metres.
     pub to_m: f64,
-    /// Maximum number of passes.
+    /// Maximum number of iterations.
     pub passes: usize,
     /// Maximum number of query points of each part per view, over all its partner views.
     pub asked: usize,
@@ -27,21 +27,28 @@ pub(super) struct Round {
     pub rest_weight: f32,
 }
 
-/// Result of a round for one view.
+/// Result of an alignment round for one view.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
+    /// Number of correspondences with other views.
     pub matched: usize,
+    /// Root mean square point-to-plane distance of the correspondences, metres.
     pub residual_m: f64,
+    /// True if the cameras hardly moved in the last iteration.
     pub converged: bool,
 }
 
+/// Normal equations of the correspondences between two views.
 struct Link {
     from: usize,
     to: usize,
-    /// Normal equations of the two poses, and residual sums.
+    /// Blocks of the normal matrix: first view, both views, second view.
     blocks: [Matrix6<f64>; 3],
+    /// Right-hand sides of the first and the second view.
     rights: [Vector6<f64>; 2],
+    /// Number of correspondences.
     matched: usize,
+    /// Sum of the squared point-to-plane distances, square metres.
     squares: f64,
 }
 
@@ -60,7 +67,7 @@ const SETTLED: (f64, f64) = (2e-4, 2e-4);
 /// Multiple of the convergence limit at which views still count as settled after the last
 /// iteration. From: chosen.
 const NEARLY: f64 = 5.0;
-/// Multiple of the final correspondence distance at which a round ends early. From: chosen.
+/// Multiple of the final correspondence distance up to which a round may end early. From: chosen.
 const LATE: f64 = 1.5;
 
 /// Aligns the views marked `used` jointly. `loose`: factor on each view's stated localisation error
@@ -113,7 +120,7 @@ pub(super) fn align(
     found
 }
 
-/// Query points of a view, by part.
+/// Indices of a view's points, by part: planes, objects, others.
 struct Askers([Vec<u32>; 3]);
 
 impl Askers {
@@ -187,9 +194,11 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
 /// Correspondences of one view's query points in the other view, and their normal equations for
 /// both poses.
 fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
-    /// Squared distances (half of the radius, and two standard deviations) at which a
-    /// correspondence has a quarter of its weight. From: chosen.
+    /// Squared distance at which a correspondence has a quarter of its weight, as a share of the
+    /// squared radius. From: chosen.
     const HALF_SQ: f32 = 0.25;
+    /// Minimum squared distance at which a correspondence has a quarter of its weight, in variances
+    /// of the correspondence. From: chosen.
     const SPREADS_SQ: f32 = 4.0;
     let (i, j) = (asked.from, asked.to);
     let mut sums = Sums::ZERO;
@@ -250,7 +259,8 @@ impl Link {
     }
 }
 
-/// Gauss-Newton step on all poses; returns the largest shift and rotation.
+/// Takes a Gauss-Newton step on all poses; returns the largest shift, metres, and rotation,
+/// radians.
 fn step(
     views: &[Prepared],
     used: &[bool],

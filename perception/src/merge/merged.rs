@@ -5,34 +5,34 @@ use crate::visibility::Visibility;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-/// The alignment of one view with the common frame.
+/// Alignment of one view with the common frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViewFit {
-    /// The corrected pose.
+    /// Corrected pose of the camera in the world.
     pub world_from_camera: Isometry3<f64>,
     /// Shift of the camera from its localised pose, metres.
     pub moved_m: f64,
     /// Rotation of the camera from its localised pose, radians.
     pub moved_rad: f64,
-    /// Downsampled points with a partner in another view.
+    /// Number of correspondences of thinned points with other views.
     pub matched: usize,
     /// Root mean square point-to-plane distance of the correspondences, metres.
     pub residual_m: f64,
-    /// True if the correction settled.
+    /// True if the alignment converged, or the view had nothing to align with.
     pub converged: bool,
     /// False if the view was left out of the merged cloud.
     pub used: bool,
     /// True if the view was left out because it contradicts the others.
     #[serde(default)]
     pub is_at_odds: bool,
-    /// Reason the view converged, or was left out, in words.
+    /// Result of the alignment, or the reason why the view was left out, in words.
     pub why: String,
 }
 
-/// The report of one of the five steps.
+/// Report of one step of a merge.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// Name.
+    /// Name of the step.
     pub name: String,
     /// Number of points after the step.
     pub points: usize,
@@ -47,11 +47,11 @@ pub struct Merged {
     pub cloud: Cloud,
     /// Number of views that measured each point.
     pub views_per_point: Vec<u16>,
-    /// The visibility of the used views, with corrected poses.
+    /// Visibility of the used views, with corrected poses.
     pub visibility: Visibility,
-    /// One fit a view, in the order given.
+    /// One fit per view, in the order given.
     pub fits: Vec<ViewFit>,
-    /// The steps, in order.
+    /// Reports of the steps, in order.
     pub steps: Vec<Step>,
 }
 

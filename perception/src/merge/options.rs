@@ -6,11 +6,11 @@ use crate::view::View;
 use nalgebra::{Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// The options of a merge.
+/// Options of a merge.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MergeOptions {
-    /// The up direction in the world, if known.
+    /// Up direction in the world, if known.
     pub up: Option<Unit<Vector3<f64>>>,
     /// Height range along `up` of the merged points, metres; points outside are dropped.
     pub height_band_m: Option<(f64, f64)>,
@@ -43,7 +43,7 @@ impl Default for MergeOptions {
 }
 
 impl MergeOptions {
-    /// Checks the options and the poses of what is to be merged.
+    /// Checks the options and the poses of the views.
     pub(super) fn check(&self, views: &[View]) -> Result<(), MergeError> {
         if views.is_empty() {
             return Err(MergeError::NoViews);

@@ -16,8 +16,8 @@ const LEVEL: f64 = 0.95;
 const STANDING_M: (f64, f64) = (0.01, 0.5);
 /// Cell size for the surface's outline, metres. From: chosen.
 const CELL_M: f64 = 0.05;
-/// Maximum distance of a point on a dominant plane, in standard deviations and in metres (the
-/// larger counts). From: chosen.
+/// Maximum distance of a point from a dominant plane: standard deviations, plus metres.
+/// From: chosen.
 const PLANE: (f64, f64) = (3.0, 0.006);
 /// Minimum cosine between a point's normal and its plane's. From: chosen, about 37°.
 pub(super) const PLANE_FACING: f64 = 0.8;
@@ -40,20 +40,21 @@ pub(super) enum Part {
 /// A dominant plane: `normal · p = offset_m`.
 pub(super) type Plane = (Vector3<f64>, f64);
 
-/// The parts of the points of all views.
+/// Parts of the points of all views.
 #[derive(Debug)]
 pub(super) struct Parts {
     /// Part of each point, by view.
     pub of: Vec<Vec<Part>>,
-    /// The dominant planes, world frame.
+    /// Dominant planes, world frame.
     pub planes: Vec<Plane>,
     /// Up direction, if determined.
     pub up: Option<Unit<Vector3<f64>>>,
+    /// Surface that the objects stand on; `None` if no level plane was found.
     standing: Option<Standing>,
 }
 
 impl Parts {
-    /// The parts of the points of a further view.
+    /// Parts of the points of a further view.
     pub fn of_view(&self, view: &Prepared, pose: &Isometry3<f64>) -> Vec<Part> {
         let seen: Vec<PlaneOfView> = self.planes.iter().map(|plane| PlaneOfView::of(plane, pose)).collect();
         let on_plane = |k: usize| seen.iter().any(|plane| plane.holds(view, k));
@@ -210,8 +211,8 @@ impl Standing {
         height > STANDING_M.0 && height < STANDING_M.1 && self.outline.covers(p, 0.0)
     }
 
-    /// Separates object points on the surface from other points, if a view shows enough of the
-    /// former.
+    /// Marks points off the planes that do not stand on the surface as [`Part::Around`], if the
+    /// view shows enough points that do.
     fn part(&self, parts: &mut [Part], places: &[Point3<f64>]) {
         let around: Vec<usize> =
             (0..places.len()).filter(|&k| parts[k] == Part::Standing && !self.holds(&places[k])).collect();

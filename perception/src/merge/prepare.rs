@@ -31,23 +31,23 @@ pub(super) struct Prepared {
     pub points: Vec<Surfel>,
     /// Search tree of the points; `None`, and no points, if there are more than the tree can hold.
     pub tree: Option<Neighbours>,
-    /// Points of an organised cloud to be merged, at a coarser resolution, with normals in the
-    /// camera frame.
+    /// Coarser copy of an organised cloud, with normals in the camera frame; `None` for other
+    /// clouds.
     pub coarse: Option<Cloud>,
-    /// The localised pose of the camera.
+    /// Localised pose of the camera in the world.
     pub prior: Isometry3<f64>,
-    /// Standard deviation of the position, metres.
+    /// Standard deviation of the localised position, metres.
     pub sigma_m: f64,
-    /// Standard deviation of the orientation, radians.
+    /// Standard deviation of the localised orientation, radians.
     pub sigma_rad: f64,
 }
 
 /// Surface point with its normal, camera frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surfel {
-    /// Metres.
+    /// Position, metres.
     pub at: Point3<f32>,
-    /// Unit length, towards the camera.
+    /// Unit normal, towards the camera.
     pub normal: Vector3<f32>,
     /// Standard deviation of the measurement, metres.
     pub sigma_m: f32,
@@ -63,11 +63,13 @@ impl Surfel {
     }
 }
 
-/// The bounds of the returns that are merged, in the camera frame.
+/// Bounds of the returns that are merged, in the camera frame.
 pub(super) struct Within {
-    /// Up direction in the camera frame, with the height limits along it.
+    /// Up direction in the camera frame; zero without height limits.
     up: Vector3<f32>,
+    /// Minimum and maximum height along `up`, relative to the camera, metres.
     heights_m: (f32, f32),
+    /// Square of the maximum range, square metres.
     range_sq: f32,
     /// Horizontal directions into the region, with the distance at which the region begins along
     /// each, metres.
@@ -105,7 +107,7 @@ impl Within {
         Within { edges: region.edges(&up).into_iter().map(in_camera).collect(), ..within }
     }
 
-    /// False also for a missing return.
+    /// True if a point is within range and height limits; false for a missing return.
     #[inline(always)]
     pub fn holds(&self, [x, y, z]: [f32; 3]) -> bool {
         let height = self.up.x * x + self.up.y * y + self.up.z * z;
@@ -113,14 +115,18 @@ impl Within {
     }
 }
 
-/// Filters and thins one view; empty without usable points.
+/// Filters and thins one view; without usable points the result is empty.
 pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
-    /// Default localisation error. From: chosen, as for the paper's robot.
+    /// Standard deviation of the position of a view that states none, metres. From: chosen, as for
+    /// the paper's robot.
     const SIGMA_M: f64 = 0.03;
+    /// Standard deviation of the orientation of a view that states none, radians. From: chosen, as
+    /// for the paper's robot.
     const SIGMA_RAD: f64 = 0.035;
-    /// Margin beyond the height band: spreads of localisation, and a distance, metres. From: chosen.
+    /// Margin beyond the height band: standard deviations of localisation, plus metres.
+    /// From: chosen.
     const SLACK: (f64, f64) = (3.0, 0.05);
-    /// However far off, metres. From: chosen.
+    /// Maximum standard deviation of a measurement, however far away, metres. From: chosen.
     const WORST_SIGMA_M: f32 = 0.03;
     let sigma_m = if view.pose_sigma_m > 0.0 { view.pose_sigma_m } else { SIGMA_M };
     let sigma_rad = if view.pose_sigma_rad > 0.0 { view.pose_sigma_rad } else { SIGMA_RAD };
@@ -146,10 +152,11 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     Prepared { points, tree, coarse, prior: view.world_from_camera, sigma_m, sigma_rad }
 }
 
-/// First point of each voxel that has a normal.
+/// First point with a normal in each voxel.
 fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
     /// Bits of a voxel along an axis. From: derived, three axes in 64 bits.
     const BITS: u32 = 21;
+    /// Mask of the bits of one axis. From: derived, three axes in 64 bits.
     const FULL: u64 = (1 << BITS) - 1;
     let (mut firsts, mut last) = (Vec::new(), None);
     let mut taken = FxHashSet::default();
@@ -168,7 +175,7 @@ fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
     cloud.select(&firsts)
 }
 
-/// Points of a cloud to be merged, thinned, with normals from the nearest points.
+/// Points of a cloud that are merged, thinned, with normals from the nearest points.
 fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
     /// Number of points for a normal. From: chosen.
     const NEAREST: usize = 15;
@@ -183,7 +190,8 @@ fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
     }
 }
 
-/// Organised cloud subsampled to about `about` columns; excluded pixels become missing returns.
+/// Organised cloud subsampled to about `about` columns, with excluded pixels as missing returns;
+/// `None` for other clouds.
 pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Cloud> {
     /// Mark of a pixel without a return. From: mark.
     const NONE: Point3<f32> = Point3::new(f32::NAN, f32::NAN, f32::NAN);
@@ -202,7 +210,7 @@ pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Clou
     Some(Cloud { points, grid: Some(Grid { width: columns, height: rows }), ..Cloud::default() })
 }
 
-/// The data of each view that depend on no other view.
+/// Data of each view that depend on no other view.
 pub(super) struct Ready {
     pub prepared: Vec<Prepared>,
     pub maps: Vec<Option<DepthMap>>,
@@ -248,7 +256,7 @@ pub(super) fn departure(pose: &Isometry3<f64>, prior: &Isometry3<f64>) -> (Vecto
     (turn, pose.translation.vector - prior.translation.vector)
 }
 
-/// Points of the view in the world.
+/// Points of a view in the world frame.
 pub(super) fn in_world(view: &Prepared, pose: &Isometry3<f64>) -> Vec<Point3<f64>> {
     view.points.iter().map(|p| pose * p.at()).collect()
 }

@@ -1,8 +1,9 @@
 //! Step 4, first half: exhaustive search for the pose of a view's objects on those of the other
 //! views, before point distances can be trusted.
 //!
-//! With the table level, what localisation leaves open is a shift along the table and a turn about the vertical. Small objects far apart
-//! give many wrong valleys to a local method; so the few degrees of freedom are searched on a grid, coarse to fine.
+//! With the table level, localisation leaves open a shift along the table and a rotation about the
+//! vertical. Small objects far apart give many local minima to a local method, so these few degrees
+//! of freedom are searched on a grid, coarse to fine.
 
 use super::parts::FEWEST;
 use crate::pool;
@@ -31,22 +32,26 @@ pub(super) const PERHAPS_SHARE: f64 = 0.0;
 /// From: chosen.
 const PRIOR: f64 = 0.15;
 
-/// Score of a point in an occupied cell of the same facing, and in a neighbour of such a cell.
-/// From: chosen.
+/// Score of a point in an occupied cell of the same facing. From: chosen.
 const HIT: u8 = 20;
+/// Score of a point in a cell next to an occupied one of the same facing. From: chosen.
 const BESIDE: u8 = 7;
 
-/// Score grid of the aligned surfaces: for each of six facings, the score of a point in each cell.
+/// Score grid of the aligned surfaces: for each of six facings (±x, ±y, ±z), the score of a point
+/// in each cell.
 struct Cells {
+    /// Side of a cell, metres.
     side_m: f64,
+    /// Lowest cell.
     low: [i32; 3],
+    /// Number of cells along x, y and z.
     size: [usize; 3],
     /// Scores of cells for six facings, in the order z, x, y, so that shifts along y are
     /// contiguous.
     worth: Vec<u8>,
 }
 
-/// Sides that a normal faces: ±x, ±y, ±z.
+/// Sides that a normal faces by more than `least`: 0 to 5 for +x, −x, +y, −y, +z, −z.
 fn sides(normal: &Vector3<f64>, least: f64) -> impl Iterator<Item = usize> {
     (0..6)
         .filter(move |side| if side % 2 == 0 { normal[side / 2] > least } else { normal[side / 2] < -least })
@@ -76,13 +81,13 @@ impl Cells {
         cells
     }
 
-    /// Number of a cell, `None` outside.
+    /// Index of a cell; `None` outside.
     fn index(&self, key: [i32; 3]) -> Option<usize> {
         let at: [usize; 3] = std::array::from_fn(|c| key[c].wrapping_sub(self.low[c]) as usize);
         (0..3).all(|c| at[c] < self.size[c]).then(|| (at[2] * self.size[0] + at[0]) * self.size[1] + at[1])
     }
 
-    /// Marks a surface of a facing in a cell.
+    /// Marks a cell as occupied by a surface that faces `side`, and the cells around as beside one.
     fn mark(&mut self, side: usize, at: usize) {
         let (row, plane) = (self.size[1], self.size[0] * self.size[1]);
         let table = side * plane * self.size[2];
@@ -135,7 +140,7 @@ impl Cells {
     }
 }
 
-/// The maximum error of a view along the table and about the vertical.
+/// Maximum error of a view along the table and about the vertical.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
     pub shift_m: f64,
@@ -145,13 +150,13 @@ pub(super) struct Window {
 /// Best placement of a view.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
-    /// World from world.
+    /// Rigid motion in the world that corrects the view's pose.
     pub correction: Isometry3<f64>,
     /// Share of the view's points that match at the found pose.
     pub share: f64,
 }
 
-/// Share of the view's points that match the placed surfaces at the current pose.
+/// Share of the view's points that match the placed surfaces at the current pose; 0 without points.
 pub(super) fn fits(view: &[Oriented], placed: &[Oriented], up: &Unit<Vector3<f64>>) -> f64 {
     let Some(Levelled { tried, placed, .. }) = levelled(view, placed, &frame(up)) else { return 0.0 };
     Cells::new(&placed, CELLS_M[1], 0).scores(&turned(&tried, 0.0), 0)[0]
@@ -175,10 +180,11 @@ struct Levelled {
     tried: Vec<Oriented>,
     /// Points near enough to be matched.
     placed: Vec<Oriented>,
+    /// Centre of the view's sampled points in the level frame, metres.
     middle: Vector3<f64>,
 }
 
-/// Levelled points; `None` if no points of either are left.
+/// Points in a level frame; `None` if the view or the placed surfaces have none.
 fn levelled(view: &[Oriented], placed: &[Oriented], level: &Isometry3<f64>) -> Option<Levelled> {
     let stride = (view.len() / TRIED).max(1);
     let mut tried: Vec<Oriented> = view.iter().step_by(stride).map(|(p, n)| (level * p, level * n)).collect();
@@ -281,7 +287,7 @@ fn turned(points: &[Oriented], angle: f64) -> Vec<(Point3<f64>, usize)> {
     points.iter().map(|(p, n)| (turn * p, most(turn * n))).collect()
 }
 
-/// World to a frame with z up.
+/// Rotation from the world to a frame with z up.
 fn frame(up: &Unit<Vector3<f64>>) -> Isometry3<f64> {
     let turn = UnitQuaternion::rotation_between(up, &Vector3::z()).unwrap_or_else(|| {
         UnitQuaternion::from_matrix(&Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)))

@@ -1,8 +1,10 @@
 //! Step 5, second half: smoothing of the voxels onto their common surface.
 //!
-//! Every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it, every column of a sheet along the sheet's
-//! normal onto that of the columns beside it. What a single view claims and another looked through is left out. Of a further look only what it
-//! touched is settled anew; the rest is held against the new view alone.
+//! Every voxel is moved along its normal onto the weighted mean of the neighbouring voxels with
+//! similar normals, every column of a sheet along the sheet's normal onto the mean of the
+//! neighbouring columns. Voxels that only one view shows and another looked through are dropped.
+//! After a further view, only touched cells are settled again; the others are tested against the
+//! new view alone.
 
 use super::check;
 use super::fuse::{Cell, Fused, Gathered};
@@ -35,13 +37,13 @@ struct Settled {
     normal: Vector3<f32>,
     colour: [u8; 3],
     views: u16,
-    /// Number of the cell.
+    /// Index of the cell.
     cell: u32,
-    /// True if settled again.
+    /// True if settled since the last view was added; false if unchanged.
     anew: bool,
 }
 
-/// Settled state of voxels or columns; untouched cells keep theirs.
+/// Settled state of voxels or columns, kept for cells that further views do not touch.
 #[derive(Default)]
 pub(super) struct Before {
     /// Means of the voxels; empty for columns.
@@ -120,8 +122,8 @@ impl Gathered {
         self.blocks.touched.fill(Mask::default());
     }
 
-    /// Means of all voxels, reusing earlier ones. Voxel means are needed by all neighbours, column
-    /// means by few.
+    /// Means of all voxels, reusing earlier ones; empty for columns, whose means are computed when
+    /// needed.
     fn means(&self, before: Vec<Cell>) -> Vec<Cell> {
         /// Number of cells per thread. From: work.
         const SOME: usize = 4096;
@@ -179,7 +181,7 @@ impl Gathered {
     }
 }
 
-/// Earlier settled state of a cell, after those of preceding cells were consumed.
+/// Earlier settled state of a cell, if any; cells must be asked for in order.
 fn stays(before: &mut Peekable<Iter<Settled>>, cell: usize) -> Option<Settled> {
     before.next_if(|settled| settled.cell as usize == cell).map(|settled| Settled { anew: false, ..*settled })
 }

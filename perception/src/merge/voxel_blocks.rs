@@ -4,8 +4,9 @@
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Voxels along a side of a block, and along a side with a margin of one voxel. From: work.
+/// Number of voxels along a side of a block. From: work.
 pub(super) const SIDE: usize = 8;
+/// Number of voxels along a side of a block with a margin of one voxel. From: work.
 pub(super) const WIDE: usize = SIDE + 2;
 /// Mark of an absent cell or block. From: mark.
 pub(super) const NONE: u32 = u32::MAX;
@@ -39,28 +40,30 @@ type Place = u64;
 /// Bits of a coordinate in a key. From: derived, three axes in 64 bits.
 const PLACE_BITS: u32 = 20;
 
-/// Some voxels of a block: a bit for each of a layer, x fastest.
+/// Set of voxels of a block: one number per layer along z, with one bit per voxel, x fastest.
 pub(super) type Mask = [u64; SIDE];
 
-/// Numbers of the 27 blocks around one, itself in the middle.
+/// Numbers of the 27 blocks around one, itself in the middle; `None` where there is no block.
 pub(super) type Beside = [Option<u32>; 27];
 
 /// Cells of occupied voxels.
 pub(super) struct VoxelBlocks<C> {
+    /// Number of each block, by position.
     numbers: FxHashMap<Place, u32>,
+    /// Position of each block.
     places: Vec<Place>,
-    /// Number of the cell of each voxel, block by block, x fastest.
+    /// Index of the cell of each voxel, block by block, x fastest; [`NONE`] for empty voxels.
     slots: Vec<u32>,
     /// Layers of voxels in a block, along z.
     layers: usize,
-    /// Cells; a column has its `empty` cell before it is occupied.
+    /// Cells; a block of columns has a cell, at first `empty`, for each column.
     pub cells: Vec<C>,
     empty: C,
     /// Number of occupied cells.
     pub occupied: usize,
-    /// The voxels of each block that were asked for.
+    /// Voxels of each block that were asked for since the mask was last cleared.
     pub touched: Vec<Mask>,
-    /// Blocks that were asked for of late, by the last bits of their place.
+    /// Cache of recently used blocks (position and number), by the last bits of the position.
     recent: [(Place, u32); RECENT * RECENT * RECENT],
 }
 
@@ -68,8 +71,8 @@ pub(super) struct VoxelBlocks<C> {
 const RECENT: usize = 4;
 
 impl<C: Copy> VoxelBlocks<C> {
-    /// An empty grid of blocks, whose cells begin as `empty`. Voxels that are columns along z make blocks of
-    /// one layer.
+    /// Empty grid of blocks, whose cells begin as `empty`; blocks of columns along z have one
+    /// layer.
     pub fn new(columns: bool, empty: C) -> VoxelBlocks<C> {
         VoxelBlocks {
             numbers: FxHashMap::default(),
@@ -160,7 +163,7 @@ impl<C: Copy> VoxelBlocks<C> {
         self.places.len()
     }
 
-    /// Calls `found` with the number of each cell that was asked for.
+    /// Calls `found` with the index of each touched cell.
     pub fn visit_touched(&self, mut found: impl FnMut(usize)) {
         for (slots, touched) in self.slots.chunks(self.voxels()).zip(&self.touched) {
             for (slots, mut touched) in slots.chunks(SIDE * SIDE).zip(*touched) {
@@ -271,7 +274,7 @@ fn in_block(wide: usize) -> (usize, usize) {
     (wide.div_ceil(SIDE), (wide + SIDE - 1) % SIDE)
 }
 
-/// True if a voxel of a wide block is of a mask.
+/// True if a mask holds a voxel, given by its coordinates in the block with a margin.
 #[inline(always)]
 pub(super) fn is_in(mask: &Mask, [x, y, z]: [usize; 3]) -> bool {
     mask[z - 1] >> ((y - 1) * SIDE + x - 1) & 1 == 1

@@ -23,7 +23,7 @@ use crate::situation::Situation;
 use crate::states::States;
 use crate::vocabulary::Vocabulary;
 
-/// An ability of a body, in the words of a domain.
+/// Ability of a body that domains can use: facts, calls and skills.
 #[derive(Debug)]
 pub struct Ability {
     /// Name used by domains.
@@ -36,29 +36,30 @@ pub struct Ability {
     pub calls: &'static [Meaning],
     /// Skills that the ability carries out.
     pub skills: &'static [SkillWord],
-    /// Remembered words that the ability reads by name.
+    /// Predicates, remembered by the domain, that the ability reads by name.
     pub traces: &'static [Trace],
     /// Parts of a body that the ability needs.
     pub needs: &'static [Part],
-    /// Preparation at the beginning of a run, if any.
+    /// Preparation of the ability's state at the beginning of a run, if any.
     pub begins: Option<Begins>,
     /// Fallback plan of this ability when the planner finds none, if it has its own.
     pub fallback: Option<Fallback>,
-    /// Final answer of this ability, if it has its own.
+    /// Function for the final answer, if the ability has one of its own.
     pub answers: Option<Concludes>,
     /// Initial state of a run, if the ability has state.
     pub recalls: Option<Recalls>,
     /// Contribution to the persistent belief, if any.
     pub keeps: Option<Keeps>,
-    /// Objects that the ability adds to the problem, if any.
+    /// Function for the objects that the ability adds to the problem, by type, if any.
     pub objects: Option<fn(&Situation) -> Vec<(&'static str, Vec<String>)>>,
     /// Names learned by the ability, each with its type, if any.
     pub names: Option<fn(&Known) -> Vec<(&'static str, String)>>,
-    /// Objects besides those of the problem, with their types: seen and without a name, or perhaps there and not seen by anybody.
+    /// Function for objects that are not in the problem, with their types, if any: seen ones without a
+    /// name, and unseen ones that may exist.
     pub others: Option<Others>,
     /// Learned object with a symbol, if the ability learns objects.
     pub thing: Option<fn(&States, &str) -> Option<Thing>>,
-    /// Recognition among percepts, in any domain, if any.
+    /// Recognition of learned objects among percepts, in any domain, if any.
     pub again: Option<KnowsAgain>,
     /// Update after a finished drive, if any.
     pub has_driven: Option<fn(&mut Mind, &Situation)>,
@@ -66,20 +67,21 @@ pub struct Ability {
     pub drive_failed: Option<DriveFailed>,
 }
 
-/// State of an ability at the beginning of a run, and the body's own map if any.
+/// Sets an ability's state at the beginning of a run; returns the body's own map if the ability makes
+/// one.
 pub type Recalls = fn(&Domain, Option<&Past>, &dyn Robot, &mut States) -> Option<Arc<dyn OwnMap>>;
 
-/// Objects that quantified conditions speak of though no name denotes them, with their types.
+/// Lists objects that quantified conditions range over though no name denotes them, with their types.
 pub type Others = for<'a> fn(&'a Situation) -> Vec<(&'static str, Referent<'a>)>;
 
-/// Adds to the persistent belief.
+/// Adds an ability's state to the persistent belief.
 pub type Keeps = fn(&Known, &Past, &mut Remembered);
 
-/// Takes in that a drive to a pose has failed.
+/// Handles a failed drive to a pose; returns a sentence if a retry is pointless.
 pub type DriveFailed = fn(&mut Mind, &dyn Robot, &Situation, &str, &SkillFailure) -> Option<String>;
 
 impl Ability {
-    /// An ability of a name without any facts, calls, skills or state.
+    /// Ability with a name and a description, without any facts, calls, skills or state.
     pub const fn named(name: &'static str, about: &'static str) -> Self {
         Self {
             name,
@@ -105,38 +107,39 @@ impl Ability {
     }
 }
 
-/// A word whose value an ability states.
+/// Predicate or function whose value an ability states.
 #[derive(Debug)]
 pub struct Fact {
-    /// The predicate or function.
+    /// Name of the predicate or function.
     pub name: &'static str,
     /// Argument types.
     pub types: &'static [&'static str],
     /// Meaning of the fact, in a line.
     pub about: &'static str,
-    /// The instances that hold now, a line of PDDL each.
+    /// Lists the instances that hold now, one line of PDDL each.
     pub states: fn(&Situation) -> Vec<String>,
-    /// Bounds on the value after further looks; `None`: the value is known for each object that was seen.
+    /// Bounds on the value after further views; `None`: the value is known for each object that was
+    /// seen.
     pub bounds: Option<Bounds>,
 }
 
-/// Remembered word that a skill's outcome sets and an ability reads by name.
+/// Predicate, remembered by the domain, that a skill's outcome sets and an ability reads by name.
 #[derive(Debug)]
 pub struct Trace {
-    /// The predicate.
+    /// Name of the predicate.
     pub name: &'static str,
     /// Argument types.
     pub types: &'static [&'static str],
-    /// The skill.
+    /// Name of the skill.
     pub of: &'static str,
-    /// Consequence, in a line, for a domain that does not remember the word.
+    /// Consequence, in a line, for a domain that does not remember the predicate.
     pub without: &'static str,
 }
 
 /// Facts, besides the arguments, on which the answer of a call depends.
 #[derive(Debug)]
 pub struct Reads {
-    /// The predicate.
+    /// Name of the predicate.
     pub word: &'static str,
     /// Types of the relevant arguments, each the call's only argument of that type; `None`: any
     /// object.
@@ -144,7 +147,7 @@ pub struct Reads {
 }
 
 impl Reads {
-    /// All of a predicate.
+    /// All instances of a predicate.
     pub const fn all(word: &'static str) -> Reads {
         Reads { word, of: &[] }
     }
@@ -171,7 +174,7 @@ impl Reads {
 /// A call that an ability answers.
 #[derive(Debug)]
 pub struct Meaning {
-    /// The module's name.
+    /// Name of the call in a domain.
     pub name: &'static str,
     /// Facts, besides the arguments, on which the answer depends.
     pub reads: &'static [Reads],
@@ -179,11 +182,11 @@ pub struct Meaning {
     pub is_advice: bool,
     /// Meaning of the call, in a line.
     pub about: &'static str,
-    /// The answer.
+    /// Computes the answer in a situation.
     pub answers: fn(&Situation, &Call) -> Result<Answer, CallError>,
 }
 
-/// Something that an ability can carry out.
+/// Skill of an ability, as named in a domain.
 #[derive(Debug)]
 pub struct SkillWord {
     /// Name used by actions.
@@ -196,9 +199,9 @@ pub struct SkillWord {
     pub about: &'static str,
     /// Grounds the skill for the body's current state, or states why that is impossible.
     pub ground: Grounding,
-    /// Cost and expected gain, in words.
+    /// Reason for the skill in a situation, as a clause: its cost and expected gain.
     pub because: fn(&Situation, &[&str]) -> String,
-    /// Updates the world model from the outcome; returns a sentence if there is news.
+    /// Updates the world model from the outcome; returns a sentence, empty without news.
     pub learn: Learn,
     /// Updates the world model from a failure, besides the domain's own lessons; returns a sentence
     /// if a retry is pointless.
@@ -208,25 +211,25 @@ pub struct SkillWord {
 /// Grounds a skill for the body's current state, or states why that is impossible.
 pub type Grounding = fn(&Situation, &[&str]) -> Result<Box<dyn Skill>, String>;
 
-/// Takes the outcome of a skill in.
+/// Updates the world model from the outcome of a skill; returns a sentence, empty without news.
 pub type Learn =
     fn(&mut Mind, Eyes<'_>, &Situation, &[&str], &Outcome, &mut Vec<Note>) -> Result<String, WorldError>;
 
-/// Takes the failure of a skill in.
+/// Updates the world model from the failure of a skill; returns a sentence if a retry is pointless.
 pub type Failed =
     fn(&mut Mind, Eyes<'_>, &Situation, &[&str], &SkillFailure) -> Result<Option<String>, WorldError>;
 
-/// No update from a failure.
+/// Failure handler that updates nothing.
 pub(crate) const NOTHING_MORE: Failed = |_, _, _, _, _| Ok(None);
 
-/// Prepares a run.
+/// Prepares an ability's state at the beginning of a run.
 pub type Begins = fn(&mut Mind, &Domain, &Goal);
 
-/// Fallback plans that are certainly useful, best first; each is a deed, preceded by a drive if
+/// Lists fallback plans that are certainly useful, best first; each is one skill, preceded by a drive if
 /// needed.
 pub type Fallback = fn(&Situation) -> Vec<Vec<Deed>>;
 
-/// Final answer from the last round's situation; `None` leaves the answer to *searching*.
+/// Gives the final answer from the last round's situation; `None` leaves the answer to *searching*.
 pub type Concludes = fn(&Goal, &Mind, &Situation, &Ended) -> Option<Conclusion>;
 
 /// Skill with its arguments, to be carried out by an action of the domain.
@@ -239,12 +242,12 @@ pub struct Deed {
 }
 
 impl Deed {
-    /// A skill on some objects.
+    /// Skill with its arguments.
     pub(crate) fn new(skill: &'static str, arguments: impl IntoIterator<Item = impl Into<String>>) -> Self {
         Self { skill, arguments: arguments.into_iter().map(Into::into).collect() }
     }
 
-    /// Deed preceded by the drive to a candidate.
+    /// Sequence of the drive to a candidate, unless the body is there, and this skill.
     pub(crate) fn after_drive(self, s: &Situation, to: usize) -> Vec<Deed> {
         let symbol = |n: usize| s.candidates[n].symbol.as_str();
         let drive = (to != s.at).then(|| Deed::new(MOVE, [symbol(s.at), symbol(to)]));
@@ -252,20 +255,20 @@ impl Deed {
     }
 }
 
-/// Values in the order of a rating, the greatest first; of equals the later first.
+/// Values with ratings, sorted from the greatest rating to the least; of equals the later first.
 pub(crate) fn best_first<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
     all.reverse();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.into_iter().map(|(_, value)| value).collect()
 }
 
-/// Values sorted by duration, stable.
+/// Values with durations, sorted from the shortest to the longest; equals keep their order.
 pub(crate) fn quickest_first<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().map(|(_, value)| value).collect()
 }
 
-/// The `n`-th argument of a call, by name.
+/// The `n`-th argument of a call, from 0; an error if it is missing.
 pub(crate) fn argument(call: &Call, n: usize) -> Result<&str, CallError> {
     call.arguments
         .get(n)
@@ -276,5 +279,5 @@ pub(crate) fn argument(call: &Call, n: usize) -> Result<&str, CallError> {
 /// Skill that drives from one pose to another.
 pub(crate) const MOVE: &str = "move";
 
-/// The skill that looks at a surface.
+/// Skill that takes a view of a surface.
 pub(crate) const OBSERVE: &str = "observe";

@@ -14,29 +14,29 @@ use crate::config::{ActionConfig, ActionKind, Config};
 use crate::load::Domain;
 use crate::situation::Situation;
 
-/// Completed call with its step in the plan.
+/// Completed call of an action, with its step in the plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
-    /// The call.
+    /// Action with its arguments.
     pub call: Call,
-    /// Step of the plan; times count from the start of the first step carried out together.
+    /// Step of the plan; its times count from the start of the first step carried out together.
     pub step: Step,
 }
 
-/// Skill with named arguments.
+/// Skill with its arguments.
 pub(crate) struct Grounded {
-    /// Skill.
+    /// Skill of an ability.
     pub word: &'static SkillWord,
     arguments: Vec<String>,
 }
 
 impl Grounded {
-    /// Names of the arguments.
+    /// Object names given as arguments, in the skill's order.
     pub fn arguments(&self) -> Vec<&str> {
         self.arguments.iter().map(String::as_str).collect()
     }
 
-    /// Reason for the skill in this situation.
+    /// Reason for the skill in this situation, as a clause.
     pub fn because(&self, situation: &Situation) -> String {
         (self.word.because)(situation, &self.arguments())
     }
@@ -58,7 +58,7 @@ pub(crate) fn limit_s(domain: &Domain, call: &Call) -> f64 {
     config(domain, call).limit_s()
 }
 
-/// Condition that must hold after a call.
+/// Condition that must hold after a call, as PDDL; `None` without a check.
 pub(crate) fn check(domain: &Domain, call: &Call) -> Option<String> {
     config(domain, call).check.map(|text| substitute(domain, call, &text, None))
 }
@@ -68,7 +68,7 @@ pub(crate) fn because(domain: &Domain, call: &Call) -> Option<String> {
     config(domain, call).because.map(|text| substitute(domain, call, &text, None))
 }
 
-/// Part `step` of a call; `None` past the last part.
+/// Skill of part `step` of a call, from 0; `None` past the last part.
 pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grounded> {
     let config = config(domain, call);
     let texts = config.does.texts();
@@ -140,7 +140,7 @@ pub(crate) fn doer<'a>(domain: &'a Domain, skill: &str) -> Option<&'a descry_pla
     actions.find(|action| texts(&domain.config, &action.name, &[]).iter().any(is_it))
 }
 
-/// Skill texts of an action; `None` for a program's action.
+/// Skill texts of an action; empty for an action of a program.
 fn texts(config: &Config, action: &str, parameters: &[String]) -> Vec<String> {
     let own = config.action.get(action);
     if own.is_some_and(|own| own.program.is_some()) {
@@ -174,23 +174,23 @@ fn unified(text: &str, deed: &Deed, parameters: &[String]) -> Option<Vec<Option<
     (tokens.len() == deed.arguments.len()).then_some(arguments)
 }
 
-/// The actions that a question may be answered with stay in a task.
+/// Removes the actions that change the world from a task, as a question may not use them.
 pub(crate) fn only_looking(config: &Config, task: &mut Task) {
     task.actions.retain(|action| kind(config, &action.name) < ActionKind::Changing);
 }
 
-/// Main part of a call: the skill with the action's name, else the first one.
+/// Main skill of a call: the one with the action's name, else the first one.
 pub(crate) fn foremost(domain: &Domain, call: &Call) -> Option<Grounded> {
     let parts = || (0..).map_while(|step| grounded(domain, call, step));
     parts().find(|part| part.word.name == call.action).or_else(|| parts().next())
 }
 
-/// Texts with an action's variables replaced by a call's objects.
+/// Texts with the action's variables replaced by the call's objects.
 pub(crate) fn substituted(domain: &Domain, call: &Call, texts: &[String]) -> Vec<String> {
     texts.iter().map(|text| substitute(domain, call, text, None)).collect()
 }
 
-/// The atoms that a failure teaches.
+/// Atoms of PDDL that the domain's lessons teach for a failure of a call; `by` is the blocking object.
 pub(crate) fn taught(
     domain: &Domain,
     call: &Call,
@@ -223,7 +223,7 @@ fn substitute(domain: &Domain, call: &Call, text: &str, by: Option<&str>) -> Str
     out + rest
 }
 
-/// Outcome in recorded form.
+/// Outcome of a skill as recorded JSON.
 pub(crate) fn outcome(outcome: &Outcome) -> Value {
     match outcome {
         Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),
@@ -249,7 +249,8 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
     }
 }
 
-/// An answer of the body as it is recorded; of a sweep only when it was taken, since the record has the sweep itself.
+/// Answer of the body as recorded JSON; of a sweep its timestamp alone, since the record has the sweep
+/// itself.
 fn answered(answer: &Answer) -> Value {
     match answer {
         Answer::Scanned(scanned) => json!({ "stamp_ns": scanned.stamp_ns }),
@@ -260,7 +261,7 @@ fn answered(answer: &Answer) -> Value {
     }
 }
 
-/// A call's meaning, bound to a situation.
+/// Attachment that answers a call of an ability in a situation.
 pub(crate) struct Bound {
     pub situation: Arc<Situation>,
     pub meaning: &'static Meaning,

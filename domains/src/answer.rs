@@ -28,7 +28,7 @@ use crate::saying::Saying;
 use crate::situation::Situation;
 use crate::{abilities, culprit, no_plan, reasons};
 
-/// Draws the conclusion of a run that has ended.
+/// Draws the final conclusion of a run that has ended.
 pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
     let (s, config) = (asker.s, &asker.domain.config);
     let (verdict, why) = match ended {
@@ -73,34 +73,36 @@ pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
 /// run, `{changes}` those on all surfaces.
 pub(crate) const CHANGES: &str = "changes";
 
-/// Context of an answer.
+/// Data from which an answer is made.
 pub(crate) struct Asker<'a> {
     pub domain: &'a Domain,
     pub goal: &'a Goal,
     pub lexicon: &'a Lexicon,
     pub mind: &'a Mind,
     pub round: &'a Round,
-    /// Part of a body that the domain needs and the body lacks.
+    /// Part of a body that the domain needs and the body lacks, if any.
     pub lacks: Option<Part>,
     pub s: &'a Situation,
-    /// The domain's wording of PDDL.
+    /// Wording of PDDL conditions in the domain's language.
     pub saying: &'a Saying,
-    /// Atoms that the phrase's own answer may list; `None` if it lists nothing.
+    /// Problem over all seen objects, if the phrase's own answer lists objects; `None` if it lists
+    /// nothing.
     pub listed: Option<&'a Listed>,
 }
 
-/// Beliefs about all seen objects, requested or not.
+/// Problem over all seen objects, requested or not, for answers that list objects.
 pub(crate) struct Listed {
     /// Problem of the round with an object for every thing and every kind of the domain.
     pub task: Task,
-    /// Bound calls of the task.
+    /// Attachments that answer the task's calls.
     pub attachments: Attachments,
-    /// Things by symbol: object number and name.
+    /// Number in the belief and name of each thing, by symbol.
     pub things: BTreeMap<String, (u64, String)>,
 }
 
 impl Asker<'_> {
-    /// Answer for a goal that holds: the requested object and its place.
+    /// Verdict and sentence for a goal that the planner takes to hold: the requested object and its
+    /// place.
     fn reached(&self) -> (Verdict, String) {
         let s = self.s;
         if let Some(unknown) = self.nowhere() {
@@ -156,7 +158,7 @@ impl Asker<'_> {
         (Verdict::Achieved, said.join("; "))
     }
 
-    /// Sentence about a surface with all objects identified, or certainly unknown.
+    /// Sentence about a surface whose objects are all identified, or certainly unknown.
     fn identified(&self, on: usize) -> String {
         let surface = &self.s.surfaces[on];
         let there = self.s.belief.tracks.iter().filter(|track| track.on == surface.symbol);
@@ -177,7 +179,8 @@ impl Asker<'_> {
         }
     }
 
-    /// Answer that no object of a kind was seen, once searched to the required confidence.
+    /// Verdict and sentence for a kind of which no object was seen, though the search reached the
+    /// required confidence.
     fn none_of(&self, kind: &Thing) -> (Verdict, String) {
         let s = self.s;
         let left = 1.0 - s.completeness(0);
@@ -195,8 +198,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Sentence about a room without a known surface for the requested kind; `None` if there is a
-    /// surface.
+    /// Sentence about a requested room in which no surface is known; `None` if there is no such room.
     fn nowhere(&self) -> Option<String> {
         let asked = self.s.kinds.iter().zip(&self.goal.asked.kinds);
         let mut rooms = asked.flat_map(|(kind, (_, rooms))| rooms.iter().flatten().map(move |r| (kind, r)));
@@ -209,14 +211,14 @@ impl Asker<'_> {
         ))
     }
 
-    /// Reason no drive can be taken; none if one can.
+    /// Clause on why no drive can be taken; `None` if one can.
     fn no_drive(&self) -> Option<String> {
         let culprit = culprit::of_drives(self.domain, self.round)?;
         Some(format!("no drive can be taken: {}", culprit::told(&culprit, &|t| self.saying.say(t))))
     }
 
-    /// Answer when no plan is left: the knowledge about the goal, and the reason for what is
-    /// missing.
+    /// Verdict and sentence when no plan is left: what is known about the goal, and why the rest is
+    /// missing. `is_proven` is true if no plan can exist.
     fn gave_up(&self, planner_says: &str, is_proven: bool) -> (Verdict, String) {
         let s = self.s;
         let culprit = self.no_drive();
@@ -315,8 +317,8 @@ impl Asker<'_> {
         })
     }
 
-    /// Reason why looks for a thing prove nothing: no supporting surface was seen, or too few views
-    /// agree.
+    /// Reason why views for a thing prove nothing: they contradict the map or each other, or no
+    /// supporting surface was seen; `None` if they prove something.
     fn nothing_seen(&self, thing: &Thing) -> Option<String> {
         let asked = || self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
         let contradicts =
@@ -341,7 +343,7 @@ impl Asker<'_> {
         format!("{known}{lacks}nothing that can be done brings about {wanted}{says}")
     }
 
-    /// Places of the things requested by name whose place is certain.
+    /// Sentences on the things requested by name whose place is certain.
     fn surely(&self) -> Vec<String> {
         let is_sure = |what: usize| {
             let anywhere = (0..self.s.surfaces.len()).map(|on| self.s.presence(what, on));
@@ -353,12 +355,12 @@ impl Asker<'_> {
             .collect()
     }
 
-    /// Things requested by name.
+    /// Things requested by name, with their indices.
     fn own(&self) -> impl Iterator<Item = (usize, &Thing)> {
         self.s.things.iter().enumerate().filter(|(_, t)| t.track.is_none())
     }
 
-    /// Most probable candidate for a thing, if any.
+    /// Object that a thing most probably is; `None` if no object can be.
     fn best(&self, thing: &Thing) -> Option<&Track> {
         let p = |t: &Track| thing.probability(t, &self.s.surfaces);
         self.s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) > 0.0)
@@ -371,8 +373,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Addition that a thing may be another known object, indistinguishable by looks; empty if
-    /// distinguishable.
+    /// Clause that a thing may be another known object that no view can tell apart; empty if views can.
     fn or_other(&self, thing: &Thing) -> String {
         let [model] = thing.models.as_slice() else { return String::new() };
         let mut others = self.domain.objects.iter().filter(|o| o.name != model.name && is_alike(o, model));
@@ -395,7 +396,8 @@ impl Asker<'_> {
         }
     }
 
-    /// Place of a thing that certainly stands outside the requested places.
+    /// Clause on the place of a thing that certainly stands outside the requested places; `None` for any
+    /// other thing.
     fn elsewhere(&self, thing: &Thing) -> Option<String> {
         thing.on.as_ref()?;
         let anywhere = Thing { on: None, ..thing.clone() };
@@ -419,7 +421,7 @@ impl Asker<'_> {
         self.s.belief.tracks.iter().filter(is).map(named).collect()
     }
 
-    /// Certain members of incompletely known kinds; empty if there are none.
+    /// Clause on the certain members of incompletely known kinds; empty if there are none.
     fn known_members(&self) -> String {
         let s = self.s;
         let is_open = |&n: &usize| s.completeness(n) < s.wanted_of(n);

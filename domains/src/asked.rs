@@ -1,4 +1,4 @@
-//! Subjects of a goal, collected by a visitor of its parsed condition.
+//! Things, kinds and surfaces that a goal asks about, collected by a visitor of its parsed condition.
 
 use descry_planner::Source;
 use descry_planner::task::{Comparison, Condition, Expression, PredicateId, Quantified, Task, Term};
@@ -11,22 +11,23 @@ use crate::mentions::mentions;
 use crate::objective::{Asked, VARIABLE};
 use crate::vocabulary::Vocabulary;
 
-/// Function for the certainty that a thing is on a surface; a question about that surface alone.
+/// Function for the certainty that a thing is on a surface; a goal with it asks about that surface
+/// alone.
 const PRESENCE: &str = "presence";
-/// Function for the certainty of a thing's position, which asks about no particular surface.
+/// Function for the certainty of a thing's position; a goal with it asks about no particular surface.
 const PLACED: &str = "placed";
-/// Function for the certainty of the objects on a surface.
+/// Function for the certainty of what the objects on a surface are.
 const CLARITY: &str = "clarity";
-/// Predicate of the room of a surface.
+/// Predicate for the room of a surface.
 const IN: &str = "in";
-/// Words about seen objects that need sightings to hold.
+/// Predicates and functions about objects that need sightings to hold.
 const OF_OBJECTS: [&str; 4] = ["on", "is", "confidence", PRESENCE];
 
-/// Parses a condition over the domain's words and the lexicon's names. An unknown name, such as a
-/// pose of the body, becomes an object of the expected type.
+/// Parses a condition over the domain's predicates, functions and the lexicon's names. An unknown name,
+/// such as a pose of the body, becomes an object of the expected type.
 ///
 /// # Errors
-/// The findings of the planner, drawn under the condition.
+/// The findings of the planner as text, drawn under the condition.
 pub fn parsed(condition: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Task, String> {
     let vocabulary = &domain.vocabulary;
     let types = &vocabulary.task.types;
@@ -53,7 +54,7 @@ pub fn parsed(condition: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Tas
 }
 
 impl Asked {
-    /// Reads the goal of a task.
+    /// Collects what the goal of a task asks about.
     pub fn of(task: &Task, vocabulary: &Vocabulary) -> Self {
         let mut visit = Visit::new(task, vocabulary);
         let mut scope = visit.scope(task.goal.slots);
@@ -75,7 +76,7 @@ impl Asked {
     }
 }
 
-/// True if a condition is one word alone, wanted to hold or to be at least a number.
+/// True if a condition is a single atom, or a single function required to exceed or reach a number.
 fn is_plain(own: &Condition) -> bool {
     match own {
         Condition::And(parts) => matches!(parts.as_slice(), [only] if is_plain(only)),
@@ -87,7 +88,7 @@ fn is_plain(own: &Condition) -> bool {
     }
 }
 
-/// An argument of a word.
+/// Argument of an atom or a function.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Argument {
     Name(String),
@@ -95,13 +96,14 @@ enum Argument {
     Variable(usize),
 }
 
-/// The arguments that stand in the slots of a condition.
+/// Arguments bound to the slots of a condition, by slot.
 type Scope = Vec<Argument>;
 
-/// Variable with the room that restricts it.
+/// Variable with the room that an `in` atom restricts it to.
 type Within = (Argument, String);
 
-/// Polarity of a part of a condition: wanted greater, smaller, or both.
+/// Polarity of a part of a condition: true or greater is wanted (`more`), false or smaller (`less`), or
+/// both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Wanted {
     more: bool,
@@ -121,11 +123,11 @@ struct Visit<'t> {
     task: &'t Task,
     vocabulary: &'t Vocabulary,
     asked: Asked,
-    /// Things whose positional certainty is requested.
+    /// Things whose positional certainty the goal asks about.
     placed: Vec<String>,
     /// Surfaces that the goal asks about for arbitrary things.
     whole: Vec<String>,
-    /// The derived words whose rules are being read.
+    /// Derived predicates whose rules are being visited.
     open: Vec<PredicateId>,
     variables: usize,
 }
@@ -136,7 +138,7 @@ impl<'t> Visit<'t> {
         Self { task, vocabulary, asked, placed, whole, open, variables: 0 }
     }
 
-    /// Fresh variables for all slots.
+    /// Scope of `slots` fresh variables.
     fn scope(&mut self, slots: usize) -> Scope {
         let first = self.variables;
         self.variables += slots;
@@ -192,7 +194,7 @@ impl<'t> Visit<'t> {
         }
     }
 
-    /// Visits the rules of a derived word with its arguments.
+    /// Visits the rules of a derived predicate with its arguments; a recursive use is skipped.
     fn rules(&mut self, predicate: PredicateId, arguments: &[Argument], wanted: Wanted, within: &[Within]) {
         if self.open.contains(&predicate) {
             return;
@@ -245,7 +247,7 @@ impl<'t> Visit<'t> {
         terms.iter().map(argument).collect()
     }
 
-    /// Room that an atom assigns to a variable.
+    /// Variable and room of an atom `(in ?variable room)`; `None` for any other condition.
     fn room(&self, atom: &Condition, scope: &Scope) -> Option<Within> {
         let Condition::Atom(atom) = atom else { return None };
         let arguments = self.arguments(&atom.arguments, scope);
@@ -305,7 +307,7 @@ impl<'t> Visit<'t> {
     }
 }
 
-/// Notes that the goal asks about something in some places, or anywhere.
+/// Notes that the goal asks about something in some places; `None`: anywhere.
 fn note(all: &mut Vec<(String, Option<Vec<String>>)>, name: String, places: Option<Vec<String>>) {
     match all.iter_mut().find(|(known, _)| *known == name) {
         None => all.push((name, places)),

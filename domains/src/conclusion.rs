@@ -9,17 +9,17 @@ use serde::{Deserialize, Serialize};
 pub enum Ended {
     /// The goal holds.
     Reached,
-    /// No plan exists, with reasons.
+    /// No plan exists, for these reasons.
     NoPlan(Vec<NoPlan>),
-    /// Planning was cut off, and no single step is certainly useful.
+    /// Planning was cut off, and no single step is certainly useful; with the reason.
     Undecided(String),
-    /// A limit of looks, plans or time was reached.
+    /// A limit of views, plans or time was reached; with the limit.
     Limit(String),
-    /// A step fails for good, or steps change nothing.
+    /// A step fails for good, or steps change nothing; with the reason.
     Failed(String),
 }
 
-/// The verdict on a run.
+/// Verdict on the goal of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -40,14 +40,14 @@ pub enum Verdict {
 pub struct Believed {
     /// Most likely known object; `None`: unknown.
     pub label: Option<String>,
-    /// Kind of the object.
+    /// Kind of the object; `None`: unknown.
     pub kind: Option<String>,
-    /// Probability of the label.
+    /// Probability of the label, 0 to 1.
     pub confidence: f64,
-    /// Centre of the body in the map; `None` while in the hand.
+    /// Centre of the body in the map, metres; `None` while in the hand.
     #[serde(default)]
     pub position_m: Option<[f64; 3]>,
-    /// Standard deviation of the position in its least certain direction; `None` if unknown.
+    /// Standard deviation of the position in its least certain direction, metres; `None` if unknown.
     #[serde(default)]
     pub position_sigma_m: Option<f64>,
     /// Sides of the footprint, and height, metres.
@@ -55,7 +55,7 @@ pub struct Believed {
     /// Spoken name of the supporting surface.
     #[serde(default)]
     pub on: Option<String>,
-    /// Room that this is in.
+    /// Name of the room that the object is in, if known.
     #[serde(default, rename = "in")]
     pub room: Option<String>,
     /// True if the goal asks about the object.
@@ -63,22 +63,23 @@ pub struct Believed {
     pub asked: bool,
 }
 
-/// The conclusion of a run.
+/// Conclusion of a run: the verdict, with the beliefs behind it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conclusion {
-    /// The verdict.
+    /// Verdict on the goal.
     pub verdict: Verdict,
     /// Answer with its reason, in a sentence.
     pub why: String,
     /// Confidence of the answer, 0 to 1.
     pub confidence: f64,
-    /// Probability that the sought object is there after all.
+    /// Probability that the sought object is there after all; `None` unless the goal is about a single
+    /// object.
     pub remaining: Option<f64>,
-    /// Requested object, if the goal is about a single one.
+    /// Name of the requested object, if the goal is about a single one.
     pub object: Option<String>,
-    /// Requested object as believed to stand, if found.
+    /// Requested object as believed at the end, if found.
     pub found: Option<Believed>,
-    /// Everything that is believed.
+    /// All objects as believed at the end, requested ones first.
     pub objects: Vec<Believed>,
     /// Persistent belief for later runs, if any.
     pub remembered: Option<Remembered>,

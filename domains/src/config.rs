@@ -1,4 +1,5 @@
-//! `domain.toml`: what may be said, what counts as sure, how actions are carried out, where words come from.
+//! `domain.toml`: phrases for goals, thresholds, how actions are carried out, and sources of predicates
+//! and functions.
 
 use std::collections::BTreeMap;
 
@@ -7,61 +8,66 @@ use serde::Deserialize;
 
 use crate::load::error::LoadError;
 
-/// `domain.toml`.
+/// Contents of `domain.toml`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
     /// The domain's name.
     pub name: String,
-    /// What the domain is for, in a line.
+    /// Purpose of the domain, in a line.
     pub about: String,
-    /// The abilities that it uses, by name.
+    /// Names of the abilities that the domain uses.
     #[serde(default = "searching_alone")]
     pub uses: Vec<String>,
-    /// Surfaces that goals may name although no map tells of them. Those of the map are known without being named here.
+    /// Surfaces that goals may name although no map has them; surfaces of the map need not be named
+    /// here.
     #[serde(default)]
     pub surfaces: Vec<String>,
-    /// The scene of the simulated robot when none is named.
+    /// Default scene of the simulated robot.
     #[serde(default)]
     pub scene: String,
-    /// What may be said.
+    /// What may be said. Each phrase has a goal as its meaning.
     #[serde(default)]
     pub goal: Vec<GoalPhrase>,
-    /// What counts as sure.
+    /// Probabilities that count as sure.
     #[serde(default)]
     pub thresholds: Thresholds,
-    /// Where to look from.
+    /// Viewpoints around each surface.
     #[serde(default)]
     pub candidates: Candidates,
-    /// What is expected where before anything has been seen.
+    /// Expected places of objects before anything has been seen.
     #[serde(default)]
     pub expect: Vec<Expectation>,
-    /// What plans are to make small: an expression of PDDL over the time that they take, `(total-time)`, and the domain's numbers.
+    /// Cost of a plan, to be minimised: a PDDL expression over the plan's duration in seconds,
+    /// `(total-time)`, and the domain's functions.
     #[serde(default = "total_time")]
     pub minimise: String,
     /// Limits of a run.
     #[serde(default)]
     pub limits: Limits,
-    /// How each action is carried out; one without an entry is carried out by the skill of its name.
+    /// How each action is carried out; an action without an entry is carried out by the skill with its
+    /// name.
     #[serde(default)]
     pub action: BTreeMap<String, ActionConfig>,
-    /// Where words come from that no ability states.
+    /// Sources of predicates and functions that no ability states.
     #[serde(default)]
     pub word: BTreeMap<String, WordConfig>,
-    /// How people are told of an action, a word or a call, by its name; `?from` in it stands for the name of that parameter's object.
-    /// Actions read like `looking at the ?on`, words like `the ?way is shut`. What has no line is shown as PDDL.
+    /// Text for people about an action, predicate, function or call, by its name; `?from` in it stands
+    /// for the name of that parameter's object. Actions read like `looking at the ?on`, predicates like
+    /// `the ?way is shut`. A name without a text is shown as PDDL.
     #[serde(default)]
     pub said: BTreeMap<String, String>,
     /// Objects of the domain's own types, by type.
     #[serde(default)]
     pub objects: BTreeMap<String, Vec<String>>,
-    /// Types whose objects a person may name as he likes: a slot of such a type holds any words that are no other name.
+    /// Types whose objects may be named freely: a slot of such a type holds any words that are no other
+    /// name.
     #[serde(default)]
     pub open: Vec<String>,
-    /// What holds in the beginning of words that are remembered or fixed: PDDL atoms and values.
+    /// Initial values of remembered or fixed predicates and functions, as PDDL atoms.
     #[serde(default)]
     pub init: Vec<String>,
-    /// Attachments that are programs.
+    /// Programs that answer calls, by name of the call.
     #[serde(default)]
     pub attachments: BTreeMap<String, Program>,
 }
@@ -74,88 +80,96 @@ fn total_time() -> String {
     "(total-time)".into()
 }
 
-/// A phrase and its meaning.
+/// Phrase for a goal, and its meaning.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GoalPhrase {
-    /// Words and `<slots>`. A slot is called after the type that fills it; where two slots are of one type, `<first:thing>`.
+    /// Words and `<slots>`. A slot has the name of the type that fills it; two slots of one type are
+    /// told apart as in `<first:thing>`.
     pub say: String,
-    /// Other words for the same, with the same slots.
+    /// Other wordings with the same meaning and the same slots.
     #[serde(default)]
     pub also: Vec<String>,
-    /// The goal condition in PDDL, with the same slots.
+    /// Goal condition in PDDL, with the same slots.
     pub means: String,
-    /// Whether the answer is yes or no. The robot moves and looks to find out; no action changes anything for it.
+    /// True if the answer is yes or no. The robot moves and looks to find out; no action changes the
+    /// world for a question.
     #[serde(default)]
     pub question: bool,
-    /// The confidence that is asked for where the goal says none; none: that of the thresholds.
+    /// Confidence required where the given goal states none; if left out, that of the thresholds.
     #[serde(default)]
     pub confidence: Option<f64>,
-    /// What the agent will do, in a line.
+    /// Description of what the agent will do, in a line.
     #[serde(default)]
     pub about: String,
-    /// What is answered.
+    /// Answers of the phrase, by how the run ended.
     #[serde(default)]
     pub answer: Answers,
 }
 
 impl GoalPhrase {
-    /// Every wording, the usual one first.
+    /// All wordings, the usual one first.
     pub fn ways(&self) -> impl Iterator<Item = &str> {
         std::iter::once(&self.say).chain(&self.also).map(String::as_str)
     }
 }
 
-/// What a phrase answers, by how the run ended. `<slots>` stand for what was said, `{(on <thing> ?)}` for the names of the
-/// objects in the place of the question mark for which the atom holds, `{(confidence <thing>)}` for a number.
+/// Answers of a phrase, by how the run ended. `<slots>` stand for what was said, `{(on <thing> ?)}` for
+/// the names of the objects in the place of the question mark for which the atom holds, `{(confidence
+/// <thing>)}` for a number.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Answers {
-    /// The goal holds.
+    /// Answer if the goal holds.
     pub achieved: Option<String>,
-    /// It is sure that what was asked for is not there.
+    /// Answer if what was asked for is certainly not there.
     pub not_found: Option<String>,
-    /// It cannot be told.
+    /// Answer if the goal cannot be decided.
     pub cannot_tell: Option<String>,
 }
 
-/// How much of something is expected somewhere.
+/// Prior expectation of an object at a place.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expectation {
-    /// An object or a kind; none: anything.
+    /// Name of an object or a kind; if left out, anything.
     #[serde(default)]
     pub what: Option<String>,
-    /// A surface or a room.
+    /// Name of a surface or a room.
     pub at: String,
-    /// How much more often it is there than on any other surface, however large they are.
+    /// Factor by which the object is there more often than on any other surface, whatever the sizes of
+    /// the surfaces.
     pub weight: f64,
 }
 
-/// How an action is carried out.
+/// Execution of an action.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActionConfig {
-    /// A skill with the action's variables, `"move ?from ?to"`, or several, one after the other.
+    /// Skill with the action's variables, `"move ?from ?to"`, or several skills, carried out one after
+    /// the other.
     #[serde(default)]
     pub does: Steps,
-    /// A program that carries it out, instead of a skill.
+    /// Program that carries the action out, instead of a skill.
     pub program: Option<Vec<String>>,
-    /// Effect of that program on the world: `sensing`, `moving` or `changing`; none: changing. A question is answered without changing.
+    /// Effect of that program on the world: `sensing`, `moving` or `changing`; if left out, `changing`.
+    /// A question uses no changing action.
     pub kind: Option<ActionKind>,
-    /// Time for each of its skills on the body's clock, or for the program, seconds; 60 if left out.
+    /// Time limit of each skill on the body's clock, or of the program, seconds; 60 if left out.
     pub limit_s: Option<f64>,
     /// Number of tries again after a failure that may pass; 2 if left out.
     pub retries: Option<usize>,
-    /// What becomes true when it is given up: atoms of remembered words over its variables.
+    /// Facts that become true when the action is given up: atoms of remembered predicates over its
+    /// variables.
     #[serde(default)]
     pub gives_up: Vec<String>,
-    /// What a failure teaches.
+    /// Facts learned from failures of the action.
     #[serde(default)]
     pub teaches: Vec<Teaching>,
-    /// What must hold afterwards, in PDDL over its variables; else it has failed.
+    /// PDDL condition over the action's variables that must hold afterwards; otherwise the action has
+    /// failed.
     pub check: Option<String>,
-    /// Why it is done, for people, over its variables.
+    /// Reason for the action, for people, over its variables.
     pub because: Option<String>,
 }
 
@@ -163,29 +177,29 @@ pub struct ActionConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ActionKind {
-    /// It looks, reads or reckons: the world stays as it is.
+    /// The action looks, reads or computes: the world stays as it is.
     Sensing,
     /// The body moves and leaves everything else in its place.
     Moving,
-    /// Something else moves, opens or becomes otherwise.
+    /// Something other than the body moves, opens or changes.
     Changing,
 }
 
-/// One step or several.
+/// Skills of an action: none named, one or several.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "a skill with the action's variables, or a list of them")]
 pub enum Steps {
-    /// Nothing is said.
+    /// No skill is named.
     #[default]
     Unsaid,
-    /// One.
+    /// One skill.
     One(String),
-    /// One after the other.
+    /// Several skills, carried out one after the other.
     Several(Vec<String>),
 }
 
 impl Steps {
-    /// Each as its text.
+    /// Texts of the skills, in order.
     pub fn texts(&self) -> Vec<&str> {
         match self {
             Steps::Unsaid => Vec::new(),
@@ -195,18 +209,18 @@ impl Steps {
     }
 }
 
-/// What a failure teaches.
+/// Fact learned from a failure of an action.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Teaching {
-    /// The kind of failure: `blocked`, `slipped`, `unreachable`, ….
+    /// Kind of failure: `blocked`, `slipped`, `unreachable`, ….
     pub when: String,
-    /// The atom that becomes true, over the action's variables and `?by`, what was in the way.
+    /// Atom that becomes true, over the action's variables and `?by`, the blocking object.
     pub says: String,
 }
 
 impl ActionConfig {
-    /// The words that its failures teach.
+    /// Predicates that failures of the action set.
     pub fn taught(&self) -> impl Iterator<Item = String> + '_ {
         let atoms = self.gives_up.iter().chain(self.teaches.iter().map(|t| &t.says));
         atoms.filter_map(|atom| {
@@ -215,65 +229,66 @@ impl ActionConfig {
         })
     }
 
-    /// Seconds for each skill where none are named.
+    /// Default time limit of each skill, seconds.
     pub const LIMIT_S: f64 = 60.0;
-    /// Tries after the first where none are named.
+    /// Default number of retries.
     pub const RETRIES: usize = 2;
 
-    /// Time for each of its skills, or for the program, seconds.
+    /// Time limit of each skill, or of the program, seconds.
     pub fn limit_s(&self) -> f64 {
         self.limit_s.unwrap_or(Self::LIMIT_S)
     }
 
-    /// Tries after the first.
+    /// Number of retries after the first try.
     pub fn retries(&self) -> usize {
         self.retries.unwrap_or(Self::RETRIES)
     }
 }
 
-/// Where a word comes from that no ability states.
+/// Source of a predicate or function that no ability states.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WordConfig {
-    /// A program that states it: the word is sensed.
+    /// Program that states the values: they are sensed.
     pub program: Option<Vec<String>>,
-    /// Time for its answer, seconds.
+    /// Time limit of the program's answer, seconds.
     #[serde(default = "default_program_time_s")]
     pub time_limit_s: f64,
-    /// Another word of the same arguments: where that one holds, the program has yet to find out, and its silence denies
-    /// nothing.
+    /// Predicate of the same arguments that holds while the program has yet to find out; meanwhile, the
+    /// program's silence denies nothing.
     pub untold: Option<String>,
-    /// `remembered`, `fixed` or `planned`, where it should be said rather than follow from the effects of the actions.
+    /// `remembered`, `fixed` or `planned`, to override what follows from the effects of the actions.
     pub is: Option<Source>,
 }
 
-/// Where a word that no fact states has its value from.
+/// Source of the values of a predicate or function that neither an ability nor a program states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// It changes as the effects of carried-out actions say.
+    /// Values change with the effects of carried-out actions.
     Remembered,
-    /// It never changes.
+    /// Values never change.
     Fixed,
-    /// It changes within a plan alone: every round begins as `init` says, else without it.
+    /// Values change within a plan alone: every round begins with those of `init`, else without any.
     Planned,
 }
 
-/// What counts as sure; all are probabilities.
+/// Probabilities by which something counts as sure.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Thresholds {
-    /// Ends a search.
+    /// Confidence that ends a search.
     pub confidence: f64,
-    /// No look is worth it where no more than this could be settled.
+    /// Least probability that views must be able to settle to be worthwhile.
     pub remaining: f64,
-    /// No more than this may hang on places that can be seen from nowhere, for an object to be called not there; and no more than this
-    /// and `remaining` together on all places.
+    /// Greatest probability left at places visible from nowhere for an object to count as not there;
+    /// with `remaining` added, the greatest at all places together.
     pub out_of_sight: f64,
-    /// An object is called not there where the probability that it is there after all, hidden or as one of the objects that were seen, is
-    /// no more than this.
+    /// Greatest probability that an object is there after all, hidden or as one of the seen objects, for
+    /// the object to count as not there.
     pub not_there: f64,
-    /// That a sought object is there, before the first look; more than `remaining` and `not_there`, else nobody would look.
+    /// Probability that a sought object is there, before the first view; more than `remaining` and
+    /// `not_there`, else nobody would look.
     pub prior: f64,
 }
 
@@ -283,13 +298,13 @@ impl Default for Thresholds {
     }
 }
 
-/// A ring of poses around each surface.
+/// Ring of poses around each surface.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Candidates {
-    /// How many poses the ring holds.
+    /// Number of poses in the ring.
     pub poses: usize,
-    /// From the centre of the surface to the robot.
+    /// Distance of the robot from the centre of the surface, metres.
     pub distance_m: f64,
 }
 
@@ -299,21 +314,22 @@ impl Default for Candidates {
     }
 }
 
-/// Limits of a run, so that none is without end.
+/// Limits of a run, so that every run ends.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
-    /// Looks in a run.
+    /// Maximum number of views in a run.
     pub views: usize,
-    /// Pushes in a run.
+    /// Maximum number of pushes in a run.
     pub pushes: usize,
-    /// Plans in a run.
+    /// Maximum number of plans in a run.
     pub plans: usize,
-    /// How often the very same situation may come back.
+    /// Maximum number of times that the very same situation may come back.
     pub repeats: usize,
-    /// States that the search for a plan evaluates; then the best plan so far, or one good look, is taken.
+    /// Maximum number of states evaluated in the search for a plan; then the best plan so far is taken,
+    /// or one good view.
     pub states: u64,
-    /// Time for a run on the body's clock.
+    /// Maximum duration of a run on the body's clock, seconds.
     pub seconds: f64,
 }
 
@@ -323,16 +339,16 @@ impl Default for Limits {
     }
 }
 
-/// An attachment that is a program which answers JSON lines.
+/// Program that answers a call by JSON lines.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Program {
-    /// The command and its arguments, run in the domain's folder.
+    /// Command and its arguments, run in the domain's folder.
     pub program: Vec<String>,
-    /// Time for one answer.
+    /// Time limit of one answer, seconds.
     #[serde(default = "default_program_time_s")]
     pub time_limit_s: f64,
-    /// Predicates and functions whose values the program wants with every call.
+    /// Predicates and functions whose values are sent to the program with every call.
     #[serde(default)]
     pub reads: Vec<String>,
 }
@@ -341,13 +357,14 @@ fn default_program_time_s() -> f64 {
     5.0
 }
 
-/// With less a yes would be no likelier than a no.
+/// Valid confidence: with less, a yes would be no likelier than a no.
 const SURE: &str = "a number above 0.5 and below 1";
 
-/// With more left, "not there" would be no likelier than its contrary.
+/// Valid remaining probability: with more, "not there" would be no likelier than its contrary.
 const LEFT: &str = "a number above 0 and below 0.5";
 
-/// With less, no look were worth it, and all were "not there" unseen.
+/// Valid prior: with less, no view would be worthwhile, and everything unseen would count as "not
+/// there".
 const WORTH_A_LOOK: &str = "a number above `remaining` and `not_there`, and below 1";
 
 /// Checks the numbers of a configuration.

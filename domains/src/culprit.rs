@@ -11,7 +11,7 @@ use crate::config::ActionKind;
 use crate::load::Domain;
 use crate::round::Round;
 
-/// Drives that are looked at, at most.
+/// Maximum number of instances of an action that are examined.
 const DRIVES: usize = 20_000;
 
 /// Numeric comparison nearest to holding, if numbers alone forbid every moving action; else `None`.
@@ -34,7 +34,7 @@ pub fn of_drives(domain: &Domain, round: &Round) -> Option<Compared> {
     nearest
 }
 
-/// Distance of a comparison from holding; infinite if undefined.
+/// Difference between the sides of a comparison; infinite if a side is undefined.
 fn lacks(compared: &Compared) -> f64 {
     let sides = compared.left_value.zip(compared.right_value);
     sides.map_or(f64::INFINITY, |(left, right)| (left - right).abs())
@@ -78,7 +78,7 @@ fn words(comparison: descry_planner::task::Comparison) -> &'static str {
     }
 }
 
-/// Instances of moving actions.
+/// Search through the instances of a moving action for one that no numeric condition forbids.
 struct Drives<'a> {
     semantics: &'a Semantics<'a>,
     state: &'a State,

@@ -246,7 +246,7 @@ pub(crate) fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
-/// The known name that a misspelt one is nearest to; none if all are far.
+/// Known name nearest to a misspelt one; `None` if all are far.
 pub fn nearest<'n>(found: &str, names: &[&'n str]) -> Option<&'n str> {
     let distance = |name: &&'n str| strsim::levenshtein(name, found);
     let nearest = names.iter().copied().min_by_key(distance)?;
@@ -259,7 +259,7 @@ pub fn position(metres: [f64; 3]) -> String {
     format!("({x:.2}, {y:.2}, {z:.2}) m")
 }
 
-/// A probability in percent, never more than it is: whole percents, tenths near 0 and 1.
+/// Probability in percent, rounded down: whole percents, tenths near 0 and 1.
 pub fn percent(p: f64) -> String {
     let tenths = (p * 1000.0 + 1e-9).floor().max(0.0) + 0.0;
     match tenths {
@@ -270,13 +270,14 @@ pub fn percent(p: f64) -> String {
     }
 }
 
-/// A number to two places behind the point, without zeros at its end.
+/// Number with at most two decimals, without trailing zeros.
 pub fn number(n: f64) -> String {
     let digits = format!("{:.2}", n + 0.0);
     digits.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// A name with its article: the mug, the dell box; proper names, which have a capital or a digit, have none: cup A.
+/// Name with its definite article: the mug, the dell box. Proper names, which have a capital or a digit,
+/// have none: cup A.
 pub fn the(name: &str) -> String {
     let is_proper = |c: char| c.is_uppercase() || c.is_numeric();
     if name.contains(is_proper) { name.to_string() } else { format!("the {name}") }
@@ -288,7 +289,7 @@ pub fn one(name: &str) -> String {
     format!("{} {name}", if is_vowel { "an" } else { "a" })
 }
 
-/// Several of something: cups, boxes, berries.
+/// Plural of a name: cups, boxes, berries.
 pub fn plural(name: &str) -> String {
     const HISSING: [&str; 5] = ["s", "x", "z", "ch", "sh"];
     let before_y = name.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));

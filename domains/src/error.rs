@@ -1,9 +1,9 @@
-//! Errors for which a world cannot go on.
+//! Errors that end a run.
 
 use descry_planner::PlanError;
 use descry_skills::Outcome;
 
-/// An error for which a world cannot go on.
+/// Error that ends a run.
 #[derive(Debug, thiserror::Error)]
 pub enum WorldError {
     /// The store failed for good.

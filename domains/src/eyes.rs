@@ -14,25 +14,25 @@ use crate::mind::Mind;
 /// Perception context: all that perceiving needs besides the world model.
 #[derive(Clone, Copy)]
 pub struct Eyes<'a> {
-    /// Everything that is sensed and believed.
+    /// Record of everything that is sensed and believed.
     pub record: &'a Record,
     /// Recogniser of segments.
     pub recogniser: &'a dyn Recogniser,
-    /// The known objects.
+    /// Models of the known objects.
     pub objects: &'a [ObjectModel],
-    /// The body, which is only asked.
+    /// Body, which perception asks for its description, time and poses but does not move.
     pub robot: &'a dyn Robot,
     /// Thresholds of confidence.
     pub thresholds: Thresholds,
-    /// Recognisers of learned objects.
+    /// Functions that recognise learned objects.
     pub again: &'a [KnowsAgain],
 }
 
-/// Adds learned objects to the percepts on a surface, from the surface's views and their merged
-/// cloud.
+/// Function that adds learned objects to the percepts on a surface (index), from the surface's views and
+/// their merged cloud.
 pub type KnowsAgain = fn(&mut Mind, usize, (&[View], &Merged), Vec<Percept>) -> Vec<Percept>;
 
-/// Records a document.
+/// Records a document; returns its id.
 pub(crate) fn put(
     record: &Record,
     kind: &str,
@@ -42,7 +42,7 @@ pub(crate) fn put(
     Ok(record.put(draft(kind, stamp_ns, body)?)?)
 }
 
-/// A document to be recorded.
+/// Document to be recorded.
 pub(crate) fn draft(kind: &str, stamp_ns: i64, body: &impl Serialize) -> Result<Draft<'static>, WorldError> {
     let body = serde_json::to_value(body).map_err(|e| WorldError::Bug(e.to_string()))?;
     let meta = Meta { body, ..Meta::default() };

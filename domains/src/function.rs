@@ -5,27 +5,28 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-/// Function that replaces a program: same questions without `id`, and its answers are recorded like
-/// a program's.
+/// Function that replaces a program: it gets the same questions without `id`, and its answers are
+/// recorded like a program's.
 pub trait Function: std::fmt::Debug + Send + Sync {
-    /// The `value` of the answer.
+    /// Answers a question with the `value` that the program's answer would have.
     ///
     /// # Errors
+    ///
     /// The `error` of the answer, in words.
     fn answer(&self, question: &Value) -> Result<Value, String>;
 }
 
-/// Functions by the names of their words, actions or calls.
+/// Functions by the name of the predicate, function, action or call that they serve.
 pub type NamedFunctions = BTreeMap<String, Arc<dyn Function>>;
 
-/// The functions that stand in for programs of a domain.
+/// Functions that replace the programs of a domain.
 #[derive(Debug, Clone, Default)]
 pub struct Functions {
-    /// Behind calls: `attachments.NAME` of `domain.toml`.
+    /// Functions that answer calls: `attachments.NAME` of `domain.toml`.
     pub calls: NamedFunctions,
-    /// Behind facts: `word.NAME`.
+    /// Functions that state facts: `word.NAME`.
     pub facts: NamedFunctions,
-    /// Behind actions: `action.NAME`.
+    /// Functions that carry out actions: `action.NAME`.
     pub actions: NamedFunctions,
 }
 

@@ -27,11 +27,11 @@ pub struct Geometry {
 pub(crate) struct Sight {
     outline: Vec<Point3<f64>>,
     is_whole: bool,
-    /// True if the surface is on a map of the body's own making, which changes with every look.
+    /// True if the surface is on a map of the body's own making, which changes with every view.
     is_charted: bool,
-    /// Pose of the camera by viewpoint.
+    /// Camera pose in the map, by viewpoint; `None` if the surface cannot be looked at from there.
     pub cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
-    /// Viewpoints that see any part of the surface, in order.
+    /// Indices of the viewpoints that see any part of the surface, in order.
     pub viewers: OnceLock<Vec<usize>>,
     /// Derived values of the surface, kept while its geometry is unchanged.
     pub derived: Derived,
@@ -48,12 +48,12 @@ impl Geometry {
         &self.walls
     }
 
-    /// Views of a surface.
+    /// Visibility of the surface with an index.
     pub(crate) fn sight(&self, on: usize) -> &Sight {
         &self.sights[on]
     }
 
-    /// Geometry updated to the current knowledge.
+    /// Geometry for the current viewpoints, surfaces and shut doors (indices); unchanged parts are kept.
     pub(crate) fn renewed(
         &self,
         viewpoints: &[Candidate],

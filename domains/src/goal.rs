@@ -24,17 +24,17 @@ pub enum GoalError {
     NoPhrase {
         /// Words as given.
         said: String,
-        /// The domain's name.
+        /// Name of the domain.
         domain: String,
-        /// The phrases that would have been understood, a line each.
+        /// Phrases that would have been understood, one line each.
         suggestions: String,
     },
     /// A phrase fits, but a slot holds an unknown name.
     #[error("nothing is called \"{found}\" in the domain {domain}\n{suggestions}")]
     NoSuchName {
-        /// Content of the slot.
+        /// Words in the slot.
         found: String,
-        /// The domain's name.
+        /// Name of the domain.
         domain: String,
         /// Names that would have been understood.
         suggestions: String,
@@ -95,7 +95,7 @@ pub enum GoalError {
         said: String,
         /// The word that denies.
         word: String,
-        /// The phrases that would have been understood, a line each.
+        /// Phrases that would have been understood, one line each.
         suggestions: String,
     },
     /// A question is combined with a task.
@@ -230,7 +230,7 @@ fn goal_of(
     })
 }
 
-/// Meaning of a clause, in PDDL.
+/// Condition in PDDL that a clause means.
 fn condition(clause: &Clause<'_>, threshold: f64, domain: &Domain) -> Result<String, GoalError> {
     let phrase = clause.phrase;
     let bad = |because: String| GoalError::BadPhrase { phrase: phrase.say.clone(), because };
@@ -240,8 +240,8 @@ fn condition(clause: &Clause<'_>, threshold: f64, domain: &Domain) -> Result<Str
     sentence::restricted(&means, &clause.within, domain).ok_or_else(nowhere)
 }
 
-/// Answer templates of the clauses with their slot values: in sequence for "and"; none for
-/// alternatives, or if a clause has none.
+/// Answer texts of a sentence with filled slots. Clauses joined by "and" give their texts in sequence;
+/// there is none if a clause has none, or for clauses joined by "or".
 fn answers(sentence: &Sentence<'_>) -> Result<Answers, GoalError> {
     let is_joined = sentence.joint == Joint::And;
     let of = |pick: &dyn Fn(&Answers) -> &Option<String>| -> Result<Option<String>, GoalError> {
@@ -303,7 +303,8 @@ pub fn pattern(say: &str) -> Vec<&str> {
     say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect()
 }
 
-/// Types used in the domain's phrases, things first; kinds are things in the plural.
+/// Types of the slots in the domain's phrases, `thing` first; without `kind`, whose names are plurals of
+/// things, and `threshold`.
 pub fn spoken_types(domain: &Domain) -> Vec<&str> {
     let slots = domain.config.goal.iter().flat_map(|g| slots_of(&g.say)).map(type_of_slot);
     let mut types: Vec<&str> = slots.filter(|of| *of != "kind" && *of != "threshold").collect();

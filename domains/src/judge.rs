@@ -1,8 +1,10 @@
 //! Three-valued truth of a goal under the belief: unobserved facts are unknown.
 //!
-//! A word is known or lies in a [`Range`]: facts about seen objects are bounded by what looks have left open; what a program or the
-//! body states is known, unless a sensing action reveals it that was not taken yet; a remembered word is known where only looking and moving set it, where `init` speaks of it, and where an
-//! action or a failure of this run has said so. Quantified things include one that nobody has seen.
+//! The value of a predicate or function is known, or lies in a [`Range`]. Facts about seen objects are
+//! bounded by what further views may show. What a program or the body states is known, unless a sensing
+//! action that was not taken yet reveals it. A remembered predicate is known where only looking and
+//! moving set it, where `init` mentions it, and where an action or a failure of this run has set it.
+//! Quantifiers also range over an object that nobody has seen.
 
 use std::cmp::Ordering;
 
@@ -47,32 +49,32 @@ impl Truth {
     }
 }
 
-/// Truth of a condition, with the word that decides it or leaves it open.
+/// Truth of a condition, with the fact that decides it or leaves it open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
     /// Truth value.
     pub value: Truth,
-    /// Deciding word; `None` for a condition without words.
+    /// Deciding fact; `None` for a condition without facts.
     pub word: Option<Decisive>,
 }
 
-/// Word with its objects that decides a condition or leaves it open.
+/// Predicate or function, with its objects, that decides a condition or leaves it open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decisive {
-    /// Name of the word.
+    /// Name of the predicate or function.
     pub word: String,
     /// Objects as symbols of the problem; `None` for an unseen object, or one outside the problem.
     pub objects: Vec<Option<String>>,
-    /// True for a numeric word.
+    /// True for a numeric function.
     pub is_number: bool,
-    /// True if looks tell the word's value.
+    /// True if views can tell the value.
     pub is_seen: bool,
-    /// True if the word holds as believed now; for a number, true if it has a value.
+    /// True if the predicate holds as believed now; for a function, true if it has a value.
     pub holds: bool,
 }
 
 impl Decisive {
-    /// Word in PDDL, if all its objects are in the problem.
+    /// Fact in PDDL; `None` if an object is not in the problem.
     pub fn pddl(&self) -> Option<String> {
         let objects: Option<Vec<&str>> = self.objects.iter().map(Option::as_deref).collect();
         Some(format!("({})", [&[self.word.as_str()], objects?.as_slice()].concat().join(" ")))
@@ -84,13 +86,13 @@ impl Judgement {
         Judgement { value, word: None }
     }
 
-    /// True if looks may decide the word.
+    /// True if the condition is open and views may decide it.
     pub fn is_open_to_looks(&self) -> bool {
         self.value == Truth::Unknown && self.word.as_ref().is_some_and(|word| word.is_seen)
     }
 }
 
-/// Value of a slot.
+/// Object in a slot of a condition; `None` while the slot is unbound.
 type Bound<'a> = Option<Held<'a>>;
 
 #[derive(Clone, Copy)]
@@ -110,7 +112,7 @@ pub struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// Judge of the conditions of a round's task; fails if an attachment fails.
+    /// Judge of the conditions of a round's task; `None` if an attachment fails.
     pub fn new(
         domain: &'a Domain,
         words: &'a Words,
@@ -179,7 +181,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Judges a condition for all objects of some variables; `decides`: value of one instance that
+    /// Judges a condition for all values of some variables; one instance with the value `decides`
     /// suffices.
     fn each(
         &self,
@@ -207,7 +209,8 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// Values of a variable besides the objects of the problem. Of an object of a wider type it is not known if it is one.
+    /// Values of a variable besides the objects of the problem. An object of a wider type counts as
+    /// unseen, as it may not have the variable's type.
     fn others(&self, variable: &Quantified) -> Vec<Referent<'a>> {
         let (task, vocabulary) = (self.semantics.task, &self.domain.vocabulary);
         let takes = |of: &str, other: Referent<'a>| {
@@ -253,7 +256,7 @@ impl<'a> Judge<'a> {
         Judgement { value, word: Some(word) }
     }
 
-    /// Judges a derived word: true if one of its rules holds.
+    /// Judges a derived predicate: true if one of its rules holds.
     fn derived(
         &self,
         predicate: PredicateId,
@@ -367,7 +370,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Bounds on a word after further looks; `None` if looks do not tell the word.
+    /// Function that bounds the value of a predicate or function after further views; `None` if views do
+    /// not tell the value.
     fn bounds(&self, name: &str) -> Option<Bounds> {
         let word = self.vocabulary.iter().find(|word| word.name == name)?;
         match origin::of(self.domain, word) {
@@ -376,21 +380,23 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// True if what states a word says nothing of one of its objects, for nobody has seen that.
+    /// True if an argument is an object that nobody has seen, and the predicate is one that is stated of
+    /// seen objects alone.
     fn is_told_of_seen_alone(&self, name: &str, arguments: &[Held<'a>]) -> bool {
         let is_sensed = |word: &Word| origin::is_sensed(self.domain, word);
         arguments.iter().any(|held| matches!(held, Held::Other(Referent::Unseen)))
             && self.vocabulary.iter().find(|word| word.name == name).is_some_and(is_sensed)
     }
 
-    /// True if the word that marks a value as not found out yet holds.
+    /// True if the predicate `mark`, which marks a value as not found out yet, holds, or may hold of an
+    /// object outside the problem.
     fn is_untold(&self, mark: &str, arguments: &[Held<'a>]) -> bool {
         let id = self.semantics.task.find_predicate(mark);
         let objects: Option<Vec<ObjectId>> = arguments.iter().map(Held::object).collect();
         id.zip(objects).is_none_or(|(id, objects)| self.state.holds(id, &objects))
     }
 
-    /// True if a word that is not stated to hold is known to be false.
+    /// True if a predicate that is not stated to hold is known to be false.
     fn is_known(&self, name: &str, arguments: &[Held<'a>]) -> bool {
         let Some(word) = self.vocabulary.iter().find(|word| word.name == name) else { return true };
         let objects: Option<Vec<String>> = arguments.iter().map(|held| self.shown(held)).collect();
@@ -469,14 +475,15 @@ impl Held<'_> {
     }
 }
 
-/// True if a remembered word depends on the robot's own actions alone: no changing action sets it.
+/// True if a remembered predicate or function depends on looking and moving alone: no changing action
+/// sets it.
 pub(crate) fn is_own(domain: &Domain, word: &str) -> bool {
     let changers = domain.vocabulary.changers(word);
     changers.into_iter().all(|action| actions::kind(&domain.config, action) < ActionKind::Changing)
 }
 
-/// Judges several parts; one with the value `decides` suffices. Among open parts, those that looks
-/// can tell come first.
+/// Judges several parts; one with the value `decides` suffices. Among open parts, one that views can
+/// tell is reported first.
 fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
     let mut left: Option<Judgement> = None;
     for part in parts {

@@ -24,87 +24,87 @@ use crate::viewpoint::Candidate;
 pub struct Thing {
     /// PDDL symbol.
     pub symbol: String,
-    /// Name used by percepts.
+    /// Name of the target in percepts.
     pub name: String,
     /// Models of the objects that may be the target.
     pub models: Vec<ObjectModel>,
     /// Colour of the target, where the goal asks for one; the name begins with it.
     pub colour: Option<&'static str>,
-    /// Surfaces that the goal restricts the target to; `None`: anywhere.
+    /// Indices of the surfaces that the goal restricts the target to; `None`: anywhere.
     pub on: Option<Vec<usize>>,
-    /// Track number, if the target is one particular seen object.
+    /// Identifier in the belief, if the target is one particular seen object.
     pub track: Option<u64>,
 }
 
 impl Thing {
-    /// Probability that a tracked object is the target, within the requested places.
+    /// Probability that a seen object is the target, within the requested places.
     pub fn probability(&self, track: &Track, surfaces: &[KnownSurface]) -> f64 {
         let meant = self.track.is_none_or(|id| id == track.id);
         let asked = self.on.as_ref().is_none_or(|on| on.iter().any(|&n| surfaces[n].symbol == track.on));
         if meant && asked { track.probability_of(&self.name) } else { 0.0 }
     }
 
-    /// True if the target may be on a surface, given the requested places.
+    /// True if the target may be on a surface (index), given the requested places; false for a seen
+    /// object.
     pub fn may_be_on(&self, surface: usize) -> bool {
         self.track.is_none() && self.on.as_ref().is_none_or(|on| on.contains(&surface))
     }
 }
 
-/// Door with its believed state.
+/// Door of the map, with its PDDL symbol.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownDoor {
     /// PDDL symbol.
     pub symbol: String,
-    /// Door of the map.
+    /// Door as the map has it.
     pub door: descry_robots::Door,
 }
 
 /// Object in the hand.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Held {
-    /// Track number that the object had.
+    /// Identifier of the object in the belief.
     pub track: u64,
 }
 
 /// World model at the beginning of a round.
 #[derive(Clone)]
 pub struct Known {
-    /// The body, which is only asked.
+    /// Body, which is asked for its state and for routes, but not moved here.
     pub robot: Arc<dyn Robot>,
     /// Belief state about objects.
     pub belief: Arc<Belief>,
     /// All supporting surfaces.
     pub surfaces: Vec<KnownSurface>,
-    /// Free, occupied and unobserved space around each surface.
+    /// Free, occupied and unobserved space around each surface, by surface index.
     pub spaces: Vec<Arc<Space>>,
     /// Poses to look from.
     pub candidates: Vec<Candidate>,
     /// Index of the candidate at which the body stands.
     pub at: usize,
-    /// Index of the candidate of the last look; initially that of the body.
+    /// Index of the candidate of the last view; initially that of the body.
     pub looked_from: usize,
-    /// Time since which the body has been at its pose.
+    /// Time since which the body has been at its pose, nanoseconds.
     pub stands_since_ns: i64,
-    /// Localisation error `map_from_localised` at the current pose, from the last look; `None`
-    /// before a look there.
+    /// Localisation error at the current pose, from the last view; `None` before a view there.
     pub errs_by: Option<Isometry3<f64>>,
     /// Requested objects.
     pub things: Vec<Thing>,
     /// Kinds of which all members are requested.
     pub kinds: Vec<Thing>,
-    /// Surfaces whose objects are requested.
+    /// Indices of the surfaces whose objects are requested.
     pub asked: Vec<usize>,
     /// Confidence that is required, 0 to 1.
     pub threshold: f64,
     /// Time until the deadline, seconds, if there is one.
     pub time_left_s: Option<f64>,
-    /// Looks taken: candidate and surface.
+    /// Views taken: candidate index and surface index of each.
     pub observed: BTreeSet<(usize, usize)>,
-    /// Candidates given up.
+    /// Indices of the candidates given up as unreachable.
     pub out_of_reach: BTreeSet<usize>,
-    /// Objects (track number) that a push from a candidate has failed to move.
+    /// Pushes that failed: identifier of the object, and index of the candidate.
     pub stuck: BTreeSet<(u64, usize)>,
-    /// Pushes that may still be tried.
+    /// Number of pushes that may still be tried.
     pub pushes_left: usize,
     /// Doors that the map knows.
     pub doors: Vec<KnownDoor>,
@@ -118,21 +118,22 @@ pub struct Known {
     pub own_map: Arc<dyn OwnMap>,
     /// State of each ability.
     pub states: States,
-    /// Prior weight of each thing, then each kind, then any object, on each surface, relative to
-    /// another surface.
+    /// Prior weight of each thing, then of each kind, on each surface (inner index), relative to other
+    /// surfaces.
     pub expected: Vec<Vec<f64>>,
     /// Geometry of the map, cached from round to round.
     pub geometry: Arc<Geometry>,
 }
 
 impl Known {
-    /// Resets the localisation error after the body has moved.
+    /// Restarts the time at the pose and resets the localisation error, after the body has moved.
     pub fn has_moved(&mut self) {
         (self.stands_since_ns, self.errs_by) = (self.robot.now_ns(), None);
     }
 }
 
-/// True if two known objects have equal shape and size and may have the same colour: they differ in name alone.
+/// True if two known objects have equal shape and size and may have the same colour: they differ in name
+/// alone.
 pub(crate) fn is_alike(one: &ObjectModel, other: &ObjectModel) -> bool {
     let named = ObjectModel {
         name: one.name.clone(),
@@ -145,7 +146,8 @@ pub(crate) fn is_alike(one: &ObjectModel, other: &ObjectModel) -> bool {
     named == *one && (is_any || one.colours.iter().any(|colour| other.colours.contains(colour)))
 }
 
-/// Search target of a goal from the domain's models: a known object, or a kind, either of any colour or of a stated one.
+/// Search target of a goal from the domain's models: a known object, or a kind of objects, either of any
+/// colour or of a stated colour.
 pub fn thing(domain: &Domain, wanted: &str) -> Thing {
     let plain = thing_of_any_colour(domain, wanted);
     match coloured(wanted).filter(|_| plain.models.is_empty()) {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::saying::Saying;
 
-/// The lesson from the failure of a step.
+/// Lesson from the failure of a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Lesson {
@@ -14,27 +14,27 @@ pub enum Lesson {
         /// The sentence.
         text: String,
     },
-    /// Facts hold from then on, in PDDL.
+    /// Facts that hold from then on, in PDDL.
     Facts {
-        /// The facts.
+        /// Facts in PDDL.
         facts: Vec<String>,
     },
     /// The step may be retried.
     Retry {
         /// Number of failed tries so far.
         tries: usize,
-        /// Tries in all.
+        /// Number of allowed tries in all.
         most: usize,
     },
-    /// The step is given up; these facts hold from then on, in PDDL.
+    /// The step is given up, and these facts hold from then on.
     GivenUp {
-        /// The facts.
+        /// Facts in PDDL.
         facts: Vec<String>,
     },
 }
 
 impl Lesson {
-    /// The lesson in a sentence.
+    /// Lesson about a call as a sentence.
     pub fn told(&self, call: &Call, saying: &Saying) -> String {
         let said =
             |facts: &[String]| facts.iter().map(|fact| saying.say(fact)).collect::<Vec<_>>().join(", ");

@@ -14,15 +14,15 @@ use crate::symbol::{SENSE, symbol};
 /// Types whose objects have names in every domain, equal to their symbols.
 pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SENSE];
 
-/// Advice for ambiguous names.
+/// Remedy for ambiguous names, in error messages.
 pub(crate) const TOLD_APART: &str = "give each a name of its own: letters and digits alone tell names apart";
 
 /// Named object: PDDL symbol and spoken names, the usual one first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Named {
-    /// The PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
-    /// Names, at least one.
+    /// Spoken names, at least one.
     pub names: Vec<String>,
 }
 
@@ -32,21 +32,21 @@ impl Named {
     }
 }
 
-/// Names of places.
+/// Spoken names of the body's places and senses.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Places {
-    /// Surfaces.
+    /// Names of surfaces.
     pub surfaces: Vec<String>,
-    /// Rooms.
+    /// Names of rooms.
     pub rooms: Vec<String>,
-    /// Doors.
+    /// Names of doors.
     pub doors: Vec<String>,
-    /// Senses of the body.
+    /// Names of the body's senses.
     pub senses: Vec<String>,
 }
 
 impl Places {
-    /// Names from a body's map.
+    /// Names of the places on a body's map and of its senses.
     pub fn of_body(robot: &dyn Robot) -> Self {
         Self {
             surfaces: robot.surfaces().iter().map(|s| s.name.clone()).collect(),
@@ -56,7 +56,7 @@ impl Places {
         }
     }
 
-    /// Names from the domain's default scene, if readable.
+    /// Names from the domain's default scene; empty if there is no readable one.
     pub fn of_scene(domain: &Domain) -> Self {
         let name = &domain.config.scene;
         let spec = domain.scenes.get(name).and_then(|text| SceneSpec::parse(name, text).ok());
@@ -94,7 +94,7 @@ impl Places {
     }
 }
 
-/// Everything that has a name, by type.
+/// Names of all named objects, by type.
 #[derive(Debug, Clone, Default)]
 pub struct Lexicon {
     by_type: BTreeMap<String, Vec<Named>>,
@@ -147,7 +147,7 @@ impl Lexicon {
         self
     }
 
-    /// Something has turned up that has a name.
+    /// Adds a name to a type, unless a name of the type has the same symbol.
     pub fn learn(&mut self, of: &str, name: &str) {
         let list = self.by_type.entry(of.into()).or_default();
         let named = Named::of(name);
@@ -156,17 +156,17 @@ impl Lexicon {
         }
     }
 
-    /// True if a symbol is valid and free.
+    /// True if a symbol is not empty and no object has it.
     pub fn is_free(&self, symbol: &str) -> bool {
         !symbol.is_empty() && self.by_type.values().flatten().all(|known| known.symbol != symbol)
     }
 
-    /// Everything of a type.
+    /// Named objects of a type.
     pub fn of_type(&self, name: &str) -> &[Named] {
         self.by_type.get(name).map_or(&[], Vec::as_slice)
     }
 
-    /// The types that have names.
+    /// Types that have named objects.
     pub fn types(&self) -> impl Iterator<Item = &str> {
         self.by_type.keys().map(String::as_str)
     }
@@ -178,7 +178,7 @@ impl Lexicon {
         found.and_then(|n| n.names.first()).map_or(symbol, String::as_str)
     }
 
-    /// Usual names of a type's objects, for suggestions.
+    /// Usual names of a type's objects, joined by commas, for suggestions.
     pub fn listed(&self, of: &str) -> String {
         let names: Vec<&str> =
             self.of_type(of).iter().filter_map(|n| n.names.first()).map(String::as_str).collect();
@@ -186,7 +186,7 @@ impl Lexicon {
     }
 }
 
-/// Known objects, and the kinds that no object is named after.
+/// Names of the known objects, and of the kinds that no object is named after.
 fn things(objects: &[ObjectModel]) -> Vec<Named> {
     let named = |o: &ObjectModel| Named {
         symbol: symbol(&o.name),
@@ -201,7 +201,7 @@ fn things(objects: &[ObjectModel]) -> Vec<Named> {
     things
 }
 
-/// Names of an object, each also in the plural.
+/// Names in the plural, followed by those in the singular.
 fn in_plural(thing: &Named) -> Named {
     let plurals = thing.names.iter().map(|name| plural(name));
     Named { symbol: thing.symbol.clone(), names: plurals.chain(thing.names.iter().cloned()).collect() }

@@ -39,23 +39,23 @@ pub const DEFAULT: &str = "tabletop";
 /// A loaded domain folder.
 #[derive(Debug, Clone)]
 pub struct Domain {
-    /// `domain.pddl`.
+    /// Text of `domain.pddl`.
     pub pddl: Source,
-    /// Vocabulary.
+    /// Declarations of `domain.pddl`.
     pub vocabulary: Vocabulary,
-    /// `domain.toml`, as text.
+    /// Text of `domain.toml`.
     pub toml: Source,
-    /// `domain.toml`.
+    /// Contents of `domain.toml`.
     pub config: Config,
     /// Models of `objects/*.toml`, in file order.
     pub objects: Vec<ObjectModel>,
     /// Shapes of `shapes/*.json`, in file order.
     pub shapes: Vec<KnownShape>,
-    /// `scenes/*.toml`: name and text.
+    /// Texts of `scenes/*.toml` by name; each later visit of a scene has an entry of its own.
     pub scenes: BTreeMap<String, String>,
-    /// Folder; `None` for a built-in domain.
+    /// Folder of the domain; `None` for a built-in domain.
     pub folder: Option<PathBuf>,
-    /// The texts that all this was read from.
+    /// Texts that the domain was read from.
     pub files: Files,
     /// In-process functions that replace programs.
     pub functions: Functions,
@@ -85,7 +85,7 @@ impl Domain {
         from_files(on_disk(folder)?, Some(folder.to_path_buf()))
     }
 
-    /// Programs named by the domain: purpose and command of each.
+    /// Programs named by the domain: name of the call, fact or action, and command.
     pub fn programs(&self) -> Vec<(&str, &[String])> {
         let calls = self.config.attachments.iter().map(|(name, p)| (name.as_str(), p.program.as_slice()));
         let words = self.config.word.iter().map(|(name, word)| (name.as_str(), &word.program));
@@ -227,7 +227,7 @@ fn visits(name: &str, text: &str) -> Vec<(String, String)> {
     std::iter::once((name.to_string(), text.to_string())).chain(later).collect()
 }
 
-/// Shape as learned by a run.
+/// Parses a shape as learned by a run.
 fn shape(path: &str, text: &str) -> Result<KnownShape, LoadError> {
     serde_json::from_str(text).map_err(|e| LoadError::File {
         path: path.into(),

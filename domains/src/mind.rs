@@ -17,11 +17,11 @@ use crate::words::Words;
 pub struct Mind {
     /// Knowledge that rounds are grounded in.
     pub known: Known,
-    /// The values of remembered and fixed words.
+    /// Values of remembered and fixed predicates and functions.
     pub words: Words,
-    /// Looks and changes, by surface.
+    /// View history of each surface.
     pub regions: Vec<Region>,
-    /// Last merge, if its views may show other surfaces.
+    /// Last merge of an unmapped surface's views, kept because they may show other surfaces, too.
     pub merged: Option<LastMerged>,
     /// Number of views taken.
     pub views: usize,
@@ -42,30 +42,30 @@ pub struct Region {
     pub looks: Vec<RecordedView>,
     /// State of the incremental merger.
     pub merger: Merger,
-    /// Views in the observed space: timestamp and camera pose of each.
+    /// Views integrated into the observed space: timestamp and camera pose of each.
     pub taken_in: Vec<(i64, Isometry3<f64>)>,
     /// Places where objects have moved.
     pub changes: Vec<Change>,
-    /// Total number of looks.
+    /// Total number of views taken.
     pub taken: usize,
-    /// Reason why the last look showed no surface; `None` if it did.
+    /// Reason why the last view showed no surface; `None` if it did.
     pub nothing: Option<String>,
     /// True if contradicting views are as many as agreeing ones, so that the wrong ones are
     /// unknown.
     pub disputed: bool,
-    /// Contradiction between the looks and the map, or among the looks, by which they prove
-    /// nothing; `None` if consistent.
+    /// Contradiction between the views and the map, or among the views, by which they prove nothing;
+    /// `None` if consistent.
     pub contradiction: Option<Contradiction>,
-    /// Objects believed to be there before the run's first look.
+    /// Objects believed to be there before the run's first view; `None` before that view.
     pub expected: Option<Vec<Track>>,
 }
 
 /// Recorded view.
 #[derive(Debug, Clone, Copy)]
 pub struct RecordedView {
-    /// When.
+    /// Timestamp of the view, nanoseconds.
     pub stamp_ns: i64,
-    /// Record.
+    /// Id of the record.
     pub record: RecordId,
     /// Distance of the camera from the surface's centre, if known, metres.
     pub away_m: f64,
@@ -78,14 +78,14 @@ pub struct RecordedView {
 pub enum Laid {
     /// As localised: there is no outline, or no alignment was tried.
     AsLocalised,
-    /// Moved by this, `map_from_localised`.
+    /// Moved by this transform, `map_from_localised`.
     By(Isometry3<f64>),
-    /// None: the view alone shows no such surface, or none within the localisation error.
+    /// Not aligned: the view alone shows no such surface, or none within the localisation error.
     Nowhere,
 }
 
 impl Mind {
-    /// Knowledge before anything was done or seen.
+    /// State before anything was done or seen.
     pub(crate) fn new(known: Known, words: Words) -> Self {
         let regions = known.surfaces.iter().map(|_| Region::default()).collect();
         let (merged, readings) = (None, BTreeMap::new());
@@ -95,7 +95,7 @@ impl Mind {
         mind
     }
 
-    /// Updates the inputs of a round from the remembered words.
+    /// Updates views taken, unreachable candidates and shut doors from the remembered facts.
     pub fn attend(&mut self) {
         let (known, words) = (&mut self.known, &self.words);
         let candidate = |name: &String| known.candidates.iter().position(|c| c.symbol == *name);
@@ -114,7 +114,7 @@ impl Mind {
         (known.observed, known.out_of_reach, known.shut) = (observed, out_of_reach, shut);
     }
 
-    /// Forgets the looks taken at a surface (`None`: at all), so that they may be repeated.
+    /// Forgets the views taken of a surface (`None`: of all), so that they may be repeated.
     pub fn forget_looks(&mut self, surface: Option<&str>) {
         let all: Vec<Vec<String>> = self.words.instances("observed").map(<[String]>::to_vec).collect();
         for look in all {
@@ -145,7 +145,7 @@ impl RecordedView {
 }
 
 impl Mind {
-    /// Records of all views that still hold.
+    /// Ids of the records of all views that still hold.
     pub(crate) fn views_held(&self) -> Vec<RecordId> {
         self.regions.iter().flat_map(|r| &r.looks).map(|look| look.record).collect()
     }

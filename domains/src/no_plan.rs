@@ -2,7 +2,7 @@
 
 use descry_planner::{NoPlan, Refusal};
 
-/// Meaning of a domain's call, in words; `None` if unknown.
+/// Description of a domain's call; `None` if unknown.
 pub type Meanings<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// Sentence about the reasons for no plan; refused calls are grouped by meaning and counted.

@@ -6,47 +6,47 @@ use serde::{Deserialize, Serialize};
 
 use crate::english::{self, percent};
 
-/// Something that was learned.
+/// News from an update of the world model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "event")]
 pub enum Note {
     /// Views were merged and looked through.
     Perceived {
-        /// The surface.
+        /// Name of the surface.
         #[serde(default)]
         on: String,
-        /// Views in the merged cloud.
+        /// Number of views in the merged cloud.
         merged: usize,
         /// Views that could not be aligned.
         left_out: Vec<LeftOut>,
-        /// Points of the merged cloud.
+        /// Number of points of the merged cloud.
         points: usize,
-        /// Root mean square distance between the views, metres.
+        /// Greatest alignment residual of a merged view, metres.
         residual_m: f64,
-        /// Believed identity of each object on the surface.
+        /// One line on each object on the surface.
         objects: Vec<String>,
         /// Changes of the belief by the last view.
         changed: Vec<BeliefChange>,
     },
     /// A surface outside the map was discovered.
     Surface {
-        /// New name.
+        /// Name given to the surface.
         name: String,
-        /// Centre of the observed part, in the map.
+        /// Centre of the observed part, map frame.
         at_m: [f64; 3],
         /// Area of the surface, square metres.
         area_m2: f64,
     },
-    /// The laser has swept.
+    /// A laser sweep was taken.
     Swept {
         /// Objects on the floor, with what is known of their shapes.
         things: Vec<OnTheFloor>,
     },
-    /// A look was added to the map.
+    /// A view was added to the map.
     Charted {
-        /// Walls of the map.
+        /// Number of walls of the map.
         walls: usize,
-        /// Pillars and round walls.
+        /// Number of pillars and round walls.
         cylinders: usize,
         /// Total length of the walls, openings left out, metres.
         walls_m: f64,
@@ -54,7 +54,7 @@ pub enum Note {
         open_m2: f64,
         /// Floor that is unknown and may be seen from somewhere, square metres.
         unseen_m2: f64,
-        /// Level supporting surfaces.
+        /// One line on each level supporting surface.
         surfaces: Vec<String>,
         /// Correction of the body's believed position by perception, metres.
         moved_m: f64,
@@ -63,7 +63,7 @@ pub enum Note {
     },
     /// A place was visited.
     Visited {
-        /// Waypoint of the visit.
+        /// Symbol of the waypoint.
         waypoint: String,
         /// Number of visits including this one; 0 if this visit could not be compared.
         visits: usize,
@@ -73,9 +73,9 @@ pub enum Note {
         turned_rad: f64,
         /// Reason why the visit could not be compared.
         strange: Option<String>,
-        /// Objects that appeared.
+        /// Texts on the objects that appeared.
         came: Vec<String>,
-        /// Vanished objects.
+        /// Texts on the objects that vanished.
         gone: Vec<String>,
     },
     /// A person moved something: observations before the last view are invalid.
@@ -100,14 +100,14 @@ pub enum Note {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum LeftOut {
-    /// Number of the view, from 1, with the reason.
+    /// Number of a view with the reason why it was left out.
     View {
-        /// The number.
+        /// Number of the view, from 1.
         view: usize,
         /// Reason, to follow the number.
         why: String,
     },
-    /// Text of an earlier version.
+    /// Text as recorded by earlier versions.
     Said(String),
 }
 
@@ -128,12 +128,12 @@ pub enum BeliefChange {
     Confidence {
         /// Name of the object.
         of: String,
-        /// Before.
+        /// Confidence before, 0 to 1.
         before: f64,
-        /// After.
+        /// Confidence after, 0 to 1.
         after: f64,
     },
-    /// Text of an earlier version.
+    /// Text as recorded by earlier versions.
     Said(String),
 }
 
@@ -159,12 +159,12 @@ pub enum OnTheFloor {
         /// True if no sweep was taken near the object.
         is_far: bool,
     },
-    /// Text of an earlier version.
+    /// Text as recorded by earlier versions.
     Said(String),
 }
 
 impl OnTheFloor {
-    /// Shape knowledge, in a line.
+    /// Knowledge of the object's shape, in a line.
     pub fn text(&self) -> &str {
         match self {
             OnTheFloor::Thing { text, .. } | OnTheFloor::Said(text) => text,
@@ -253,7 +253,7 @@ impl fmt::Display for Note {
     }
 }
 
-/// Pillars and round walls of a map, appended to its walls; empty if there are none.
+/// Text on pillars and round walls, appended to a number of walls; empty if there are none.
 pub(crate) fn and_round(cylinders: usize) -> String {
     match cylinders {
         0 => String::new(),

@@ -1,8 +1,8 @@
-//! Goal and its subjects.
+//! Goal of a run, and the objects that it asks about.
 
 use crate::config::Answers;
 
-/// Placeholder of a variable among the objects of a word.
+/// Placeholder for a variable among the objects of a predicate or function.
 pub const VARIABLE: &str = "?";
 
 /// Goal as given by a person, with its PDDL meaning.
@@ -14,9 +14,9 @@ pub struct Goal {
     pub phrase: String,
     /// Goal condition in PDDL.
     pub pddl: String,
-    /// Subjects of the condition.
+    /// Objects that the condition asks about.
     pub asked: Asked,
-    /// Values of the slots.
+    /// Slots of the phrase with their values.
     pub slots: Vec<Filled>,
     /// True for a yes-no question.
     pub question: bool,
@@ -24,7 +24,8 @@ pub struct Goal {
     pub answer: Answers,
     /// Confidence that ends the search, 0 to 1.
     pub threshold: f64,
-    /// Deadline, seconds on the body's clock.
+    /// Time from the start of the run to the deadline, seconds on the body's clock; `None` without a
+    /// deadline.
     pub deadline_s: Option<f64>,
 }
 
@@ -35,16 +36,17 @@ pub struct Filled {
     pub slot: String,
     /// Index among slots of the same name, from 0.
     pub number: usize,
-    /// The PDDL symbol.
+    /// PDDL symbol of the value.
     pub symbol: String,
-    /// The usual name.
+    /// Usual spoken name of the value.
     pub name: String,
 }
 
 /// Objects that a goal's condition speaks of.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Asked {
-    /// Requested things, each with the surfaces or rooms it is asked about; `None`: anywhere.
+    /// Requested things, each with the surfaces or rooms that the goal restricts it to; `None`:
+    /// anywhere.
     pub things: Vec<(String, Option<Vec<String>>)>,
     /// Kinds requested completely, each with its rooms; `None`: anywhere.
     pub kinds: Vec<(String, Option<Vec<String>>)>,
@@ -53,17 +55,18 @@ pub struct Asked {
     /// True if the condition wants a fact about seen objects to be false, or a certainty to be
     /// small.
     pub denies: bool,
-    /// True if the goal needs more than looking.
+    /// True if the condition has a fact that looking cannot establish.
     pub more: bool,
-    /// True if the condition is a single word that must hold or reach a number.
+    /// True if the condition is a single predicate that must hold, or a single function that must reach
+    /// a number.
     pub plain: bool,
-    /// Words of the condition with their objects, in order, including those behind derived words;
-    /// variables are [`VARIABLE`].
+    /// Predicates and functions of the condition with their objects, in order, including those in rules
+    /// of derived predicates; variables are [`VARIABLE`].
     pub words: Vec<(String, Vec<String>)>,
 }
 
 impl Asked {
-    /// Objects of each occurrence of a word in the condition.
+    /// Objects of each occurrence of a predicate or function in the condition.
     pub fn of_word<'a>(&'a self, word: &'a str) -> impl Iterator<Item = &'a [String]> {
         self.words.iter().filter(move |(name, _)| name == word).map(|(_, objects)| objects.as_slice())
     }

@@ -1,4 +1,4 @@
-//! Sources of the values of words: abilities, programs, the domain itself.
+//! Sources of the values of predicates and functions: abilities, programs, the domain itself.
 
 use crate::abilities;
 use crate::ability::Fact;
@@ -7,7 +7,7 @@ use crate::config::{ActionKind, Source as Kept};
 use crate::load::Domain;
 use crate::vocabulary::Word;
 
-/// The source of a word's value in a run.
+/// Source of the values of a predicate or function in a run.
 #[derive(Debug, Clone, Copy)]
 pub enum Origin {
     /// Stated by an ability's fact from the current belief.
@@ -24,7 +24,7 @@ pub enum Origin {
     Derived,
 }
 
-/// The source of a word's value.
+/// Source of the values of a predicate or function.
 pub fn of(domain: &Domain, word: &Word) -> Origin {
     let config = &domain.config;
     let configured = config.word.get(&word.name);
@@ -47,21 +47,22 @@ pub fn of(domain: &Domain, word: &Word) -> Origin {
     }
 }
 
-/// Names of the domain's remembered and fixed words.
+/// Names of the domain's remembered predicates and functions.
 pub fn remembered(domain: &Domain) -> Vec<String> {
     let vocabulary = &domain.vocabulary;
     let is_remembered = |w: &Word| matches!(of(domain, w), Origin::Remembered);
     vocabulary.words().into_iter().filter(is_remembered).map(|w| w.name).collect()
 }
 
-/// True if a program states the value of a word once a sensing action has been taken that sets it: until then nobody knows it.
+/// True if a program states the values of a predicate or function, and they are unknown until a sensing
+/// action has been taken that sets them.
 pub fn is_revealed(domain: &Domain, word: &Word) -> bool {
     let senses = |action: &str| actions::kind(&domain.config, action) == ActionKind::Sensing;
     matches!(of(domain, word), Origin::SensedByProgram)
         && domain.vocabulary.changers(&word.name).into_iter().any(senses)
 }
 
-/// True if an ability or a program states the value of a word.
+/// True if an ability or a program states the values of a predicate or function.
 pub fn is_sensed(domain: &Domain, word: &Word) -> bool {
     matches!(of(domain, word), Origin::Sensed(_) | Origin::SensedByProgram)
 }

@@ -31,7 +31,7 @@ pub trait OwnMap: Send + Sync {
     /// True if a surface is on this map.
     fn has(&self, surface: &str) -> bool;
 
-    /// True if a wall or pillar of this map stands between two places.
+    /// True if a wall or pillar of this map stands between two points.
     fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool;
 
     /// Sentence about frontiers of the map, where unobserved floor begins without a wall; `None`

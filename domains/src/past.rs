@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 /// Persistent belief from earlier runs, and the time at which this run began.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Past {
-    /// Last sightings of objects.
+    /// Belief that earlier runs left.
     pub remembered: Arc<Remembered>,
-    /// Seconds since 1970.
+    /// Unix time at which this run began, seconds.
     pub now_unix_s: f64,
 }

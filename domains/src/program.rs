@@ -1,15 +1,16 @@
 //! Attachment implemented by a program: reads questions and writes answers, one JSON object per
 //! line.
 //!
-//! A question is `{"id": 7, "module": "path-cost", "kind": "cost", "arguments": ["a", "b"], "readings": [...],
-//! "level": "exact"}`; its answer is `{"id": 7, "value": 3.2}` or `{"id": 7, "error": "why not"}`. A value is a number
-//! (`"inf"` for infinity) for a cost, true or false for a condition, a list of values for an effect, a list of names for
-//! a grounding module. Answers may come in any order; the program is started at its first question and gets many
-//! questions at once where the planner has them.
+//! A question is `{"id": 7, "module": "path-cost", "kind": "cost", "arguments": ["a", "b"], "readings":
+//! [...], "level": "exact"}`; its answer is `{"id": 7, "value": 3.2}` or `{"id": 7, "error": "why
+//! not"}`. A value is a number (`"inf"` for infinity) for a cost, true or false for a condition, a list
+//! of values for an effect, a list of names for a grounding module. Answers may come in any order; the
+//! program is started at its first question and gets many questions at once where the planner has them.
 //!
-//! It runs in a process group of its own, which is killed as a whole, with at most `MOST_DATA_BYTES` of memory a process (Linux).
-//! Of the environment it sees `SEEN` and nothing else: no password or token of whoever runs descry. A line that is longer than
-//! `MOST_LINE_BYTES` is an error, and lines that nobody has read wait in its pipe.
+//! The program runs in a process group of its own, which is killed as a whole, with at most
+//! `MOST_DATA_BYTES` of memory per process (Linux). Of the environment the program sees `SEEN` and
+//! `LC_…` and nothing else: no password or token of whoever runs descry. An answer line longer than
+//! `MOST_LINE_BYTES` is an error; unread lines wait in the program's pipe.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{BufRead, BufReader, Read as _, Write};
@@ -31,7 +32,7 @@ use crate::function::Function;
 
 /// Number of last lines of standard error shown when a program ends.
 const LAST_WORDS: usize = 5;
-/// Maximum length of an answer line, bytes.
+/// Maximum length of a kept line of standard error, bytes.
 const MOST_WORD_BYTES: u64 = 1 << 10;
 /// Maximum length of an answer line, bytes; enough for some ten thousand proposals.
 const MOST_LINE_BYTES: u64 = 1 << 20;
@@ -59,10 +60,11 @@ const SEEN: [&str; 12] = [
 
 /// Tape that records programs' answers and replays those of an earlier session of the run.
 pub trait Tape: std::fmt::Debug + Send + Sync {
-    /// Answers to `asked`: from the tape, or from the program by `live`, then recorded.
+    /// Gives the answers to `asked`: from the tape, or from the program by `live`, then recorded.
     ///
     /// # Errors
-    /// Why there are none.
+    ///
+    /// The reason why there are none.
     fn answer(&self, asked: &Value, live: &dyn Fn() -> Value) -> Result<Value, String>;
 }
 
@@ -114,7 +116,7 @@ impl ProgramAttachment {
         Self { program, folder, function: None, tape: None, running: Mutex::new(None) }
     }
 
-    /// Reads and writes the program's answers on a tape.
+    /// Records the program's answers on a tape, or replays them from it.
     #[must_use]
     pub fn on(self, tape: Option<Arc<dyn Tape>>) -> Self {
         Self { tape, ..self }
@@ -425,7 +427,7 @@ fn read_said(said: Said, line: &str) -> Result<Result<Answer, CallError>, CallEr
     }
 }
 
-/// Answer in a program's JSON form.
+/// Answer in the JSON form that tapes record.
 pub fn written(answer: &Result<Answer, CallError>) -> Value {
     match answer {
         Ok(Answer::Number(cost)) if cost.is_infinite() => json!({ "value": "inf" }),
@@ -452,7 +454,7 @@ fn read_error(answer: &Value) -> Option<CallError> {
     timed_out().or_else(wrong).or_else(other)
 }
 
-/// Reads at most `most` answers in the form of [`written`].
+/// Reads exactly `most` answers in the form of [`written`].
 fn read_answers(answers: Value, most: usize) -> Result<Vec<Result<Answer, CallError>>, CallError> {
     let line = answers.to_string();
     let said: Vec<Value> =

@@ -20,7 +20,7 @@ pub struct Programs {
     actions: BTreeMap<String, ProgramAction>,
 }
 
-/// An action that a program carries out.
+/// Action that a program carries out.
 pub struct ProgramAction {
     program: Arc<ProgramAttachment>,
 }
@@ -48,7 +48,7 @@ impl Programs {
         Self { calls: calls.collect(), facts: facts.collect(), actions: actions.collect() }
     }
 
-    /// Binds the programs behind calls.
+    /// Binds the programs that answer calls.
     pub fn bind(&self, attachments: &mut Attachments) {
         for (name, program) in &self.calls {
             attachments.insert_shared(name.clone(), Arc::clone(program) as Arc<dyn Attachment>);
@@ -60,13 +60,14 @@ impl Programs {
         self.actions.get(name)
     }
 
-    /// Facts that a word's program states now, one PDDL line each. The question is `{"id": 0,
-    /// "fact": "raining", "objects": ["table", …]}`, the answer `{"id": 0, "value":
-    /// ["(raining)"]}`. If senses were read, the question contains their last readings:
-    /// `"readings": {"rain-gauge": 1.5}`.
+    /// Facts that the program of a predicate or function states now, one PDDL line each. The question is
+    /// `{"id": 0, "fact": "raining", "objects": ["table", …]}`, the answer `{"id": 0, "value":
+    /// ["(raining)"]}`. If senses were read, the question contains their last readings: `"readings":
+    /// {"rain-gauge": 1.5}`.
     ///
     /// # Errors
-    /// Why there is no usable answer.
+    ///
+    /// The reason why there is no usable answer.
     pub fn state(
         &self,
         word: &Word,
@@ -101,9 +102,9 @@ impl Programs {
 }
 
 impl ProgramAction {
-    /// Skill of a call by its program. The question is `{"id": 0, "action": "greet", "arguments":
-    /// ["anna"]}`, the answer `{"id": 0, "value": "said hello"}`; `{"id": 0, "error": "why not"}`
-    /// and `false` are retried as the domain says.
+    /// Skill that carries a call out by its program. The question is `{"id": 0, "action": "greet",
+    /// "arguments": ["anna"]}`, the answer `{"id": 0, "value": "said hello"}`; `{"id": 0, "error": "why
+    /// not"}` and `false` are retried as the domain says.
     pub fn perform(&self, call: &Call) -> Box<dyn Skill> {
         let program = Arc::clone(&self.program);
         let question = json!({ "action": call.action, "arguments": call.arguments });

@@ -1,21 +1,21 @@
-//! Range of values that a word may take after further looks.
+//! Range of values that a predicate or function may take after further views.
 
 use descry_memory::belief::Track;
 
 use crate::situation::Situation;
 
-/// Range of a word's value; predicates are 1 if true and 0 if false.
+/// Range of the value of a predicate or function; a predicate is 1 if true and 0 if false.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     /// Value as believed now.
     pub believed: f64,
-    /// Minimum value that further looks may leave.
+    /// Minimum value that further views may leave.
     pub least: f64,
-    /// Maximum value that further looks may bring.
+    /// Maximum value that further views may bring.
     pub greatest: f64,
 }
 
-/// Argument of a word.
+/// Argument of a predicate or function.
 #[derive(Debug, Clone, Copy)]
 pub enum Referent<'a> {
     /// Object of the problem, by symbol.
@@ -26,30 +26,31 @@ pub enum Referent<'a> {
     Unseen,
 }
 
-/// Range of a word on some objects, in a situation.
+/// Function that bounds the value of a predicate or function on some objects, in a situation.
 pub type Bounds = fn(&Situation, &[Referent<'_>]) -> Range;
 
 impl Range {
-    /// Unknown probability.
+    /// Range of an unknown probability.
     pub const UNKNOWN: Range = Range { believed: 0.0, least: 0.0, greatest: 1.0 };
-    /// Unknown number.
+    /// Range of an unknown number.
     pub const UNDEFINED: Range =
         Range { believed: f64::NEG_INFINITY, least: f64::NEG_INFINITY, greatest: f64::INFINITY };
 
-    /// A value that is known.
+    /// Range of a known value.
     pub const fn exactly(value: f64) -> Range {
         Range { believed: value, least: value, greatest: value }
     }
 
-    /// Certainty that looks may raise; fixed once it reaches `wanted`.
+    /// Range of a certainty that views may raise; its lower bound is fixed once the certainty reaches
+    /// `wanted`.
     pub fn certainty(value: f64, wanted: f64) -> Range {
         // As the problem of a round states it.
         let value = (value * 1e6).round() / 1e6;
         Range { believed: value, least: if value >= wanted { value } else { 0.0 }, greatest: 1.0 }
     }
 
-    /// Truth of a predicate with a probability; settled if the probability, or its complement,
-    /// reaches `wanted`.
+    /// Range of a predicate with a probability; settled if the probability, or its complement, reaches
+    /// `wanted`.
     pub fn settled(probability: f64, wanted: f64) -> Range {
         match probability {
             p if p >= wanted => Range::exactly(1.0),

@@ -1,4 +1,4 @@
-//! Reasons for looks, and remaining doubts, in words.
+//! Texts on remaining doubts, and on what was seen.
 
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{self, Point3, Vector3};
@@ -50,14 +50,15 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     out_of_sight(s, doubt, "it").or_else(unsettled).or_else(in_all)
 }
 
-/// Known object that a track more likely is, with its probability; empty if there is none.
+/// Clause on the known object that a seen object more likely is than `thing`, and on its colour; empty
+/// if there is none.
 pub fn rather(track: &Track, thing: &Thing) -> String {
     let is_it = |name: &str| thing.models.iter().any(|m| m.name == name);
     likelier(&track.probabilities, track.probability_of(&thing.name), is_it) + &colour(track, thing)
 }
 
-/// The colour that a track is likelier to have than the one that is asked for, with its probability, or that none was seen; empty if
-/// colour decides nothing.
+/// Clause on the colour that a seen object more likely has than the requested one, with its probability,
+/// or on its colour not having been seen; empty if colour decides nothing.
 fn colour(track: &Track, thing: &Thing) -> String {
     let decides = thing.colour.is_some() || thing.models.iter().any(|m| !m.colours.is_empty());
     match thing.colour {
@@ -77,7 +78,7 @@ pub fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str)
     most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {}", percent(*p)))
 }
 
-/// Sentence about a searched surface that may not be a supporting surface.
+/// Sentence about a searched surface that may not be a supporting surface; `None` if there is no doubt.
 pub fn may_be_none(s: &Situation, thing: &Thing) -> Option<String> {
     let asked = s.surfaces.iter().enumerate().filter(|(n, _)| thing.may_be_on(*n));
     asked.into_iter().find_map(|(_, k)| {
@@ -106,7 +107,7 @@ pub fn left_in_all(s: &Situation) -> Option<String> {
     more.filter(|_| !is_seen).or_else(|| left_of_kinds(s))
 }
 
-/// First kind that is incompletely found.
+/// Index of the first kind that is incompletely found.
 fn open_kind(s: &Situation) -> Option<usize> {
     (0..s.kinds.len()).find(|&of| s.completeness(of) < s.wanted_of(of))
 }
@@ -120,8 +121,8 @@ fn least_sure(s: &Situation, of: usize) -> Option<(&Track, f64)> {
     least.filter(|(_, p)| sure(*p) < s.threshold)
 }
 
-/// Reason why the list of a kind is incomplete: the least certain member, and the chance of unseen
-/// ones.
+/// Sentence on why the list of a kind is incomplete: the least certain member, and the chance of unseen
+/// ones; `None` if it is complete.
 fn left_of_kinds(s: &Situation) -> Option<String> {
     let open = open_kind(s)?;
     let kind = &s.kinds[open];
@@ -142,15 +143,15 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     ))
 }
 
-/// Advice when looks cannot reach the requested confidence: `most` is reachable, `now` is reached.
+/// Clause for a requested confidence that views cannot reach: `most` is reachable, `now` is reached.
 pub fn at_most(most: f64, now: f64) -> String {
     let said = if now > 0.5 { format!("; at {} it could be said", percent(now)) } else { String::new() };
     format!(", and no look can raise that above {}{said}", percent(most))
 }
 
-/// Subject of the doubt about a kind: the least certain object, or all objects if each is certain
-/// enough but their joint doubt dominates; and the unseen places, if they alone exceed the allowed
-/// doubt or there is no such object.
+/// Clause on the doubt about a kind: the least certain object, or all objects if each is certain enough
+/// but their joint doubt dominates; and the unseen places, if they alone exceed the allowed doubt or
+/// there is no such object.
 pub fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is_bare: bool) -> String {
     let says_hidden = is_bare || hidden >= WORTH_SAYING && (hidden > allowed || least.is_none());
     let hidden = hidden.max(0.0);
@@ -167,7 +168,7 @@ pub fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is
     least.or_else(all_seen).into_iter().chain(more.clone()).collect()
 }
 
-/// Rooms that a question about a kind names, in words; empty if none.
+/// Clause on the rooms that a question about a kind names; empty if none.
 pub fn in_room(s: &Situation, kind: &Thing) -> String {
     let mut rooms: Vec<&str> = Vec::new();
     for room in kind.on.iter().flatten().filter_map(|&on| s.surfaces[on].room.as_deref()) {
@@ -183,8 +184,9 @@ fn out_of_time(s: &Situation) -> Option<String> {
         .then(|| "there is no time left for the looks that would settle it".into())
 }
 
-/// Coverage of a thing's possible places: seen share and viewpoints of each surface, and the
-/// remaining probability `left` that the thing is there; `looks`: number of looks at each surface.
+/// Sentence on the coverage of a thing's possible places: seen share and viewpoints of each surface, and
+/// the remaining probability `left` that the thing is there. `looks` gives the number of views of a
+/// surface.
 pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) -> usize) -> String {
     let of = |on: usize, surface: &KnownSurface| -> Option<String> {
         let share = doubt.share_seen(on)?;
@@ -200,7 +202,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) ->
     format!("{}; a chance of {} is left", parts.join(", "), percent(left))
 }
 
-/// Sentence about possible places that no look can show; `None` if negligible.
+/// Clause on possible places that no view can show; `None` if negligible.
 fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
     let (hidden, places) = doubt.out_of_sight(s);
     let middle =
@@ -213,7 +215,7 @@ fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
     })
 }
 
-/// Position in words.
+/// Horizontal position as text, metres.
 pub fn place(p: &Point3<f64>) -> String {
     format!("({:.2}, {:.2}) m", p.x, p.y)
 }

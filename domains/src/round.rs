@@ -11,12 +11,12 @@ use crate::situation::Situation;
 pub struct Round {
     /// Snapshot from which the calls are answered.
     pub situation: Arc<Situation>,
-    /// The problem.
+    /// Parsed problem.
     pub task: Task,
-    /// Bound calls.
+    /// Attachments that answer the problem's calls.
     pub attachments: Attachments,
-    /// The problem's text.
+    /// PDDL text of the problem.
     pub problem: Source,
-    /// Record of the problem.
+    /// Id of the recorded problem.
     pub record: RecordId,
 }

@@ -1,5 +1,5 @@
-//! Verbalisation of PDDL by the domain's `[said]` lines for actions, words and calls; an expression
-//! without a line is shown in PDDL.
+//! Verbalisation of PDDL by the domain's `[said]` lines for actions, predicates, functions and calls; an
+//! expression without a line is shown in PDDL.
 
 use std::collections::BTreeMap;
 
@@ -8,20 +8,20 @@ use crate::goal::spoken_types;
 use crate::lexicon::{Lexicon, NAMED, Places};
 use crate::load::Domain;
 
-/// Line of `[said]`: parameters with types, in order; and the text.
+/// Line of `[said]`: parameters (name and type) in order, and the text.
 type Form = (Vec<(String, String)>, String);
 
-/// The domain's wording of PDDL.
+/// Wording of PDDL expressions in the domain's language.
 #[derive(Debug, Default)]
 pub struct Saying {
     forms: BTreeMap<String, Form>,
-    /// Names of symbols, by type.
+    /// Spoken names of symbols, by type.
     names: BTreeMap<String, BTreeMap<String, String>>,
     /// Types whose objects people speak of.
     spoken: Vec<String>,
 }
 
-/// An expression in PDDL.
+/// Parsed PDDL expression.
 #[derive(Debug, PartialEq)]
 enum Written<'t> {
     One(&'t str),
@@ -44,11 +44,11 @@ impl Mood {
     }
 }
 
-/// Variables in scope: type and spoken name of each.
+/// Variables in scope: name, and phrase that stands for the variable in the sentence.
 type Bound<'t> = [(&'t str, String)];
 
 impl Saying {
-    /// Verbaliser of a domain, with its place names.
+    /// Wording of a domain, with its place names.
     pub fn of(domain: &Domain, places: &Places) -> Self {
         Saying::of_lexicon(domain, &Lexicon::new(domain, places))
     }
@@ -101,17 +101,18 @@ impl Saying {
         denied.unwrap_or_else(|| format!("{} would not hold", self.say(pddl)))
     }
 
-    /// Text as a single expression.
+    /// Text parsed as a single expression; `None` if it is none.
     fn whole<'t>(&self, pddl: &'t str) -> Option<Written<'t>> {
         expression(pddl.trim()).filter(|(_, after)| after.is_empty()).map(|(written, _)| written)
     }
 
-    /// True if the domain has a line for an action, a word or a call.
+    /// True if the domain has a line for an action, predicate, function or call.
     pub fn has(&self, name: &str) -> bool {
         self.forms.contains_key(name)
     }
 
-    /// Wording of an action, a word or a call in general: `looking at the surface from a pose`.
+    /// Wording of an action, predicate, function or call in general: `looking at the surface from a
+    /// pose`.
     pub fn in_general(&self, name: &str) -> String {
         let Some((parameters, text)) = self.forms.get(name) else { return name.to_string() };
         let general = |text: String, (variable, of): &(String, String)| {
@@ -120,12 +121,12 @@ impl Saying {
         parameters.iter().fold(text.clone(), general)
     }
 
-    /// Spoken name of an object, if any.
+    /// Spoken name of an object; the symbol with spaces for hyphens if it has none.
     pub fn name_of(&self, symbol: &str) -> String {
         self.name(symbol, NAMED[0], &[])
     }
 
-    /// Verbalised expression; `None` if a part has no wording.
+    /// Sentence for an expression; `None` if a part has no wording.
     fn told(&self, written: &Written<'_>, bound: &Bound<'_>) -> Option<String> {
         let Written::List(parts) = written else { return None };
         let (Written::One(head), arguments) = parts.split_first()? else { return None };
@@ -154,7 +155,7 @@ impl Saying {
         }
     }
 
-    /// Sentence that denies an expression.
+    /// Sentence that denies an expression; `None` if a part has no wording.
     fn denied(&self, written: &Written<'_>, bound: &Bound<'_>, mood: Mood) -> Option<String> {
         let Written::List(parts) = written else { return None };
         let (Written::One(head), arguments) = parts.split_first()? else { return None };
@@ -182,7 +183,7 @@ impl Saying {
         Some(format!("{} is {is}{}", side(a)?, side(b)?))
     }
 
-    /// Parts of a quantified sentence over a type: subject and statement.
+    /// Type that a quantifier ranges over, and the sentence for its body.
     fn quantified(
         &self,
         over: &Written<'_>,
@@ -202,7 +203,7 @@ impl Saying {
         Some((of, self.told(body, &inner)?))
     }
 
-    /// Type of a variable, from its position in the body.
+    /// Type of a variable, from its position in the body of a quantifier.
     fn type_of(&self, variable: &str, body: &Written<'_>) -> Option<String> {
         let Written::List(parts) = body else { return None };
         let here = || {
@@ -213,7 +214,8 @@ impl Saying {
         here().or_else(|| parts.iter().find_map(|part| self.type_of(variable, part)))
     }
 
-    /// The domain's line for an action, word or call, with the names of its arguments.
+    /// Domain's line for an action, predicate, function or call, with the names of its arguments filled
+    /// in.
     fn form(&self, head: &str, arguments: &[Written<'_>], bound: &Bound<'_>) -> Option<String> {
         let (parameters, text) = self.forms.get(head)?;
         if parameters.len() != arguments.len() {
@@ -236,7 +238,7 @@ impl Saying {
         Some(said + rest)
     }
 
-    /// Name of a symbol, or of the value of a variable.
+    /// Spoken name of a symbol, or the phrase that stands for a variable.
     fn name(&self, symbol: &str, of: &str, bound: &Bound<'_>) -> String {
         if let Some((_, it)) = bound.iter().find(|(variable, _)| *variable == symbol) {
             return it.clone();

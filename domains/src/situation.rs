@@ -12,8 +12,8 @@ use crate::config::Thresholds;
 use crate::known::Known;
 use crate::states::Derived;
 
-/// Snapshot of the world model that grounds one planning round: [`Known`] and values derived from
-/// it. Nothing in it moves anything.
+/// Snapshot of the world model that grounds one planning round: [`Known`] and values derived from it.
+/// Reading it moves nothing.
 pub struct Situation {
     known: Known,
     /// Thresholds of confidence.
@@ -23,7 +23,7 @@ pub struct Situation {
     pub(crate) derived: Derived,
 }
 
-/// A candidate to drive from, and the doors that are shut then.
+/// Index of the candidate that a drive starts from, and indices of the doors that are shut then.
 type Departure = (usize, Vec<usize>);
 
 /// Lookups and routes, computed on demand and cached.
@@ -32,12 +32,12 @@ struct Travel {
     /// Candidate indices by symbol.
     candidates: OnceLock<HashMap<String, usize>>,
     travel_s: Vec<OnceLock<Vec<f64>>>,
-    /// Candidates of the round's plans, once chosen, in order.
+    /// Indices of the candidates that the round's plans may use, in ascending order, once chosen.
     focused: OnceLock<Vec<usize>>,
-    /// Travel times to the focused candidates only.
+    /// Travel times to the chosen candidates only, by start.
     travel_to_focused_s: Vec<OnceLock<Vec<f64>>>,
     travel_past_s: Mutex<BTreeMap<Departure, Arc<Vec<f64>>>>,
-    /// Objects by surface index.
+    /// Indices of the objects on each surface, by surface index.
     standing: OnceLock<Vec<Vec<usize>>>,
 }
 
@@ -50,7 +50,7 @@ impl std::ops::Deref for Situation {
 }
 
 impl Situation {
-    /// Grounds a round in the current knowledge.
+    /// Takes a snapshot of the current knowledge for a round.
     pub fn new(mut known: Known, thresholds: Thresholds) -> Self {
         known.geometry =
             Arc::new(known.geometry.renewed(&known.candidates, &known.surfaces, &known.shut, &|surface| {
@@ -64,9 +64,10 @@ impl Situation {
         Self { known, thresholds, travel, derived: Derived::default() }
     }
 
-    /// The candidate of a symbol.
+    /// Index of the candidate with a symbol.
     ///
     /// # Errors
+    ///
     /// [`CallError::Failed`] if there is none.
     pub fn candidate(&self, name: &str) -> Result<usize, CallError> {
         let symbols = self.travel.candidates.get_or_init(|| {
@@ -77,9 +78,10 @@ impl Situation {
         found.ok_or_else(|| CallError::Failed(format!("`{name}` is not a pose to look from")))
     }
 
-    /// Surface of a symbol.
+    /// Index of the surface with a symbol.
     ///
     /// # Errors
+    ///
     /// [`CallError::Failed`] if there is none.
     pub fn surface(&self, name: &str) -> Result<usize, CallError> {
         find(self.surfaces.iter().map(|s| &s.symbol), name, "a surface")
@@ -93,9 +95,10 @@ impl Situation {
         find(self.things.iter().map(|t| &t.symbol), name, "something that is looked for")
     }
 
-    /// Door of a symbol.
+    /// Index of the door with a symbol.
     ///
     /// # Errors
+    ///
     /// [`CallError::Failed`] if there is none.
     pub fn door(&self, name: &str) -> Result<usize, CallError> {
         find(self.doors.iter().map(|d| &d.symbol), name, "a door")
@@ -128,7 +131,7 @@ impl Situation {
         row[to]
     }
 
-    /// Sets the candidates of the round's plans; routes between them are computed together.
+    /// Sets the candidates that the round's plans may use; routes between them are computed together.
     pub(crate) fn focus_on(&self, candidates: Vec<usize>) {
         self.travel.focused.get_or_init(|| candidates);
     }
@@ -176,7 +179,7 @@ impl Situation {
         standing[on].iter().map(|&n| &self.belief.tracks[n])
     }
 
-    /// Surface that an object stands on.
+    /// Index of the surface that an object stands on; `None` for an object in the hand or lost.
     pub fn surface_of(&self, track: &Track) -> Option<usize> {
         self.surfaces.iter().position(|s| s.symbol == track.on)
     }
@@ -186,7 +189,8 @@ impl Situation {
         self.errs_by.map_or(*p, |map_from_localised| map_from_localised.inverse() * p)
     }
 
-    /// Looks that the plan takes before a call, from the `observed` facts in the call's readings.
+    /// Looks (candidate, surface) that the plan takes before a call, from the `observed` facts that the
+    /// call reads.
     pub(crate) fn planned_looks(&self, call: &Call) -> Vec<(usize, usize)> {
         let look = |r: &descry_planner::Reading| {
             let from = self.candidate(r.arguments.first()?).ok()?;
@@ -197,7 +201,7 @@ impl Situation {
     }
 }
 
-/// True atoms of a predicate among a call's readings.
+/// Facts of a predicate that hold, among those that a call reads.
 pub(crate) fn holding<'a>(
     call: &'a Call,
     predicate: &'a str,
@@ -205,7 +209,7 @@ pub(crate) fn holding<'a>(
     call.readings.iter().filter(move |r| &*r.symbol == predicate && r.value == FactValue::Truth(true))
 }
 
-/// Index of a symbol among objects of one kind.
+/// Index of a symbol among objects of one kind; `expected` names the kind in the error.
 pub(crate) fn find<'a>(
     mut symbols: impl Iterator<Item = &'a String>,
     name: &str,

@@ -26,7 +26,7 @@ pub fn slots_of(text: &str) -> Vec<&str> {
 /// every mention stands for the only value.
 ///
 /// # Errors
-/// A slot that the phrase does not have, or of which it has several and the text not as many.
+/// A slot that the phrase does not have, or one that the phrase and the text have in different numbers.
 pub fn put_in(text: &str, slots: &[Filled], with: impl Fn(&Filled) -> String) -> Result<String, String> {
     let mut out = text.to_string();
     let mentioned = slots_of(text);

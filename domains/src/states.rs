@@ -67,7 +67,7 @@ struct Made {
 }
 
 impl Derived {
-    /// Value of a type.
+    /// Derived value of a type, computed by `make` on first access.
     pub fn get<T: Any + Send + Sync>(&self, make: &dyn Fn() -> T) -> &T {
         let made =
             self.0.get_or_init(|| Box::new(Made { value: Box::new(make()), others: Derived::default() }));

@@ -27,10 +27,9 @@ pub struct KnownSurface {
     pub up: Vector3<f64>,
     /// True if the outline is complete (from the map); false if it covers the seen part.
     pub whole: bool,
-    /// Reason why it may not be a supporting surface, in words after its name; `None` if undoubted.
+    /// Reason why this may not be a supporting surface, in words after its name; `None` if undoubted.
     pub doubtful: Option<String>,
-    /// Certainty of the alignment with the map's outline; `None` without an outline, or before a
-    /// look.
+    /// Certainty of the alignment with the map's outline; `None` without an outline, or before a view.
     pub placed: Option<Certainty>,
     /// Displacement between the observed and the mapped surface, metres; either may be wrong.
     pub displaced_m: f64,
@@ -62,8 +61,8 @@ impl KnownSurface {
         self.floor.len() >= 3 && !is_over(&self.floor, &Vector3::z(), point, -WALL_M - blur_m)
     }
 
-    /// True if a point lies over the measured footprint of an object here, or over the circle
-    /// around its size.
+    /// True if a point lies over the measured footprint of an object on this surface or, without a
+    /// footprint, over the circle around the object's size.
     pub(crate) fn is_of(&self, track: &Track, point: &Point3<f64>, margin_m: f64) -> bool {
         if track.footprint_m.len() >= 3 {
             return is_over(&track.footprint_m, &self.up, point, margin_m);

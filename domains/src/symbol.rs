@@ -12,5 +12,5 @@ pub fn symbol(name: &str) -> String {
     if symbol.starts_with(|c: char| c.is_ascii_digit()) { format!("n-{symbol}") } else { symbol }
 }
 
-/// The type of the body's senses.
+/// PDDL type of the body's senses.
 pub const SENSE: &str = "sense";

@@ -8,7 +8,7 @@ use crate::symbol::symbol;
 
 static TEMPLATE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/template");
 
-/// Name of the template in its own files.
+/// Name of the domain in the template's files, replaced by that of the new domain.
 const NAME: &str = "new-domain";
 
 /// Files of a new domain: relative path and text of each.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use descry_planner::Span;
 use toml::de::{DeTable, DeValue};
 
-/// Number of `domain.toml` among the sources of the findings; the first is `domain.pddl`.
+/// Index of `domain.toml` among the sources of the findings; the first is `domain.pddl`.
 const TOML: usize = 1;
 
 /// Resolves key paths of `domain.toml` to source spans, for diagnostics.

@@ -2,7 +2,7 @@
 
 use descry_robots::Place;
 
-/// Somewhere to stand and look from.
+/// Place from which the body can look.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// PDDL symbol.

@@ -1,4 +1,4 @@
-//! Words declared by a domain, with their origins.
+//! Predicates, functions, types and actions declared by a domain.
 
 use std::collections::BTreeSet;
 
@@ -10,22 +10,22 @@ use descry_planner::{Findings, Source, Span};
 /// Declarations of a domain's PDDL text.
 #[derive(Debug, Clone)]
 pub struct Vocabulary {
-    /// Domain with an empty problem.
+    /// Parsed domain with an empty problem.
     pub task: Task,
     changed: BTreeSet<String>,
     given: BTreeSet<String>,
 }
 
-/// A predicate or a function.
+/// Predicate or numeric function.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Word {
-    /// Name.
+    /// Name of the predicate or function.
     pub name: String,
     /// Argument types by name; for an `either`, the first type.
     pub types: Vec<String>,
     /// True for a numeric function.
     pub is_number: bool,
-    /// True if defined by rules.
+    /// True for a derived predicate, which rules define.
     pub is_derived: bool,
     /// Span of the declaration.
     pub span: Span,
@@ -35,7 +35,7 @@ impl Vocabulary {
     /// Reads the declarations of a domain.
     ///
     /// # Errors
-    /// Every finding in its text.
+    /// All findings in the domain's text.
     pub fn read(pddl: &Source) -> Result<Self, Findings> {
         let name = domain_name(&pddl.text);
         let nothing = format!("(define (problem nothing) (:domain {name}) (:objects) (:init) (:goal (and)))");
@@ -59,7 +59,7 @@ impl Vocabulary {
         found.ancestors.iter().any(|id| self.task.type_of(*id).name == other)
     }
 
-    /// Every predicate and numeric function.
+    /// All predicates and numeric functions.
     pub fn words(&self) -> Vec<Word> {
         let types = |parameters: &[descry_planner::task::Parameter]| {
             parameters.iter().map(|p| self.type_name(&p.types)).collect()
@@ -81,12 +81,12 @@ impl Vocabulary {
         predicates.chain(functions).collect()
     }
 
-    /// The word of a name.
+    /// Predicate or numeric function with this name.
     pub fn word(&self, name: &str) -> Option<Word> {
         self.words().into_iter().find(|w| w.name == name)
     }
 
-    /// Parameters of an action: type and name of each; `None` for an unknown action.
+    /// Parameters of an action: name and type of each; `None` for an unknown action.
     pub fn action(&self, name: &str) -> Option<Vec<(String, String)>> {
         let action = self.task.actions.iter().find(|a| a.name == name)?;
         Some(action.parameters.iter().map(|p| (p.name.clone(), self.type_name(&p.types))).collect())
@@ -110,12 +110,12 @@ impl Vocabulary {
         self.task.objects.iter().filter(|o| is(&o.types)).map(|o| o.name.clone()).collect()
     }
 
-    /// True if an action's effects change a word.
+    /// True if an action's effects change a predicate or function.
     pub fn is_changed(&self, word: &str) -> bool {
         self.changed.contains(word)
     }
 
-    /// The actions whose effects change a word, by name.
+    /// Names of the actions whose effects change a predicate or function.
     pub fn changers(&self, word: &str) -> Vec<&str> {
         let changes = |action: &Action| {
             let rates =
@@ -127,13 +127,13 @@ impl Vocabulary {
         self.task.actions.iter().filter(|action| changes(action)).map(|action| action.name.as_str()).collect()
     }
 
-    /// True if an action's condition compares a number.
+    /// True if an action's start condition compares a numeric function.
     pub fn is_compared(&self, word: &str) -> bool {
         let is_it = |fluent: &Fluent| self.task.function(fluent.function).name == *word;
         self.task.actions.iter().any(|action| compares(&action.condition.start, &is_it))
     }
 
-    /// True if an action assigns a word regardless of the earlier value.
+    /// True if an action sets a predicate or function regardless of the earlier value.
     pub fn is_given(&self, word: &str) -> bool {
         self.given.contains(word)
     }
@@ -143,7 +143,7 @@ impl Vocabulary {
     }
 }
 
-/// Name in `(define (domain`; missing names are reported by the parser.
+/// Name of the domain in `(define (domain …`; a missing name is left to the parser to report.
 fn domain_name(text: &str) -> String {
     let lower: String =
         text.lines().map(|l| l.split(';').next().unwrap_or_default()).collect::<Vec<_>>().join(" ");
@@ -153,7 +153,7 @@ fn domain_name(text: &str) -> String {
     found.unwrap_or("domain").to_string()
 }
 
-/// True if a condition compares a number.
+/// True if a condition compares a numeric function that `is_it` accepts.
 fn compares(condition: &Condition, is_it: &dyn Fn(&Fluent) -> bool) -> bool {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| compares(part, is_it)),
@@ -177,7 +177,7 @@ fn reads(expression: &Expression, is_it: &dyn Fn(&Fluent) -> bool) -> bool {
     }
 }
 
-/// Words changed by action effects accepted by `is_such`.
+/// Names of the predicates and functions changed by those action effects that `is_such` accepts.
 fn changed(task: &Task, is_such: impl Fn(&Change) -> bool) -> BTreeSet<String> {
     let effects = task.actions.iter().flat_map(|a| a.effects.start.iter().chain(&a.effects.end));
     effects.filter(|effect| is_such(&effect.change)).flat_map(|e| changed_by(task, &e.change)).collect()

@@ -10,8 +10,9 @@ const BEFORE_M: f64 = 0.05;
 /// Maximum thickness of a wall, metres: the distance of two rooms' outlines from the centre of the
 /// door between them.
 const THICK_M: f64 = 0.3;
-/// Minimum side of a cell of the index, metres, and the maximum number of cells along a side.
+/// Minimum side of a cell of the index, metres.
 const CELL_M: f64 = 2.0;
+/// Maximum number of cells along a side of the index.
 const MOST_CELLS: f64 = 256.0;
 
 /// Walls of a map in a spatial index: the cost of a line of sight depends on its length, not on the
@@ -24,7 +25,7 @@ pub struct Walls {
     cell_m: f64,
     /// Number of cells along each axis.
     size: [usize; 2],
-    /// Walls whose bounding box touches the cell, by number.
+    /// Indices of the walls whose bounding box touches each cell.
     cells: Vec<Vec<u32>>,
 }
 

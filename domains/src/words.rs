@@ -1,4 +1,4 @@
-//! Values of remembered and fixed words.
+//! Values of remembered and fixed predicates and functions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use crate::load::Domain;
 use crate::vocabulary::{Vocabulary, Word};
 
-/// Instances of remembered and fixed words that hold or have a value, by word.
+/// Instances of remembered and fixed predicates and functions that hold or have a value, by name.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Words {
     held: BTreeMap<String, BTreeMap<Vec<String>, f64>>,
-    /// Words that `init` mentions.
+    /// Predicates and functions that `init` mentions.
     begun: BTreeSet<String>,
     /// Instances that this run has set or unset.
     told: BTreeSet<(String, Vec<String>)>,
@@ -23,10 +23,11 @@ pub struct Words {
 const HOLDS: f64 = 1.0;
 
 impl Words {
-    /// Words with the initial values of the domain.
+    /// Initial values of the domain.
     ///
     /// # Errors
-    /// Why a line of `init` cannot be read.
+    ///
+    /// The first line of `init` that cannot be used, with the reason.
     pub fn begin(domain: &Domain, is_sensed: &dyn Fn(&Word) -> bool) -> Result<Self, String> {
         let mut words = Self::default();
         for line in &domain.config.init {
@@ -49,7 +50,7 @@ impl Words {
         Ok(words)
     }
 
-    /// Sets a word for some arguments: 1 and 0 are true and false for a predicate.
+    /// Sets a predicate or function for some arguments; `None` makes it false, or takes its value away.
     pub fn set(&mut self, name: &str, arguments: Vec<String>, value: Option<f64>) {
         self.told.insert((name.into(), arguments.clone()));
         let instances = self.held.entry(name.into()).or_default();
@@ -59,15 +60,16 @@ impl Words {
         };
     }
 
-    /// Takes in that an action has revealed if an atom holds, which a program states.
+    /// Notes that an action has revealed an atom whose truth a program states.
     pub fn reveal(&mut self, name: &str, arguments: Vec<String>) {
         self.told.insert((name.into(), arguments));
     }
 
-    /// Makes an atom true that is written in PDDL.
+    /// Sets an atom, a negated atom or a value that is written in PDDL.
     ///
     /// # Errors
-    /// Why it cannot be read.
+    ///
+    /// The reason why the text cannot be read.
     pub fn say(&mut self, atom: &str) -> Result<(), String> {
         for (name, arguments, value) in read(atom)? {
             self.set(&name, arguments, value);
@@ -75,22 +77,22 @@ impl Words {
         Ok(())
     }
 
-    /// Forgets everything about a word.
+    /// Removes all values of a predicate or function.
     pub fn forget(&mut self, name: &str) {
         self.held.remove(name);
     }
 
-    /// True if `init` mentions a word, so that its other atoms are initially false.
+    /// True if `init` mentions a predicate or function, so that its other atoms are initially false.
     pub fn is_spoken_of(&self, name: &str) -> bool {
         self.begun.contains(name)
     }
 
-    /// True if an action, a look or a failure of this run has decided if an atom holds.
+    /// True if an action, a view or a failure of this run has decided whether an atom holds.
     pub fn is_told(&self, name: &str, arguments: &[String]) -> bool {
         self.told.contains(&(name.to_string(), arguments.to_vec()))
     }
 
-    /// Arguments of a word's instances that hold or have a value.
+    /// Arguments for which a predicate holds or a function has a value.
     pub fn instances(&self, name: &str) -> impl Iterator<Item = &[String]> {
         self.held.get(name).into_iter().flat_map(|i| i.keys().map(Vec::as_slice))
     }
@@ -117,7 +119,7 @@ impl Words {
         }
     }
 
-    /// PDDL lines that state the words, for known objects.
+    /// PDDL lines that state all values whose objects are known.
     pub fn lines(&self, vocabulary: &Vocabulary, is_known: impl Fn(&str) -> bool) -> Vec<String> {
         let mut lines = Vec::new();
         for (name, instances) in &self.held {
@@ -139,7 +141,7 @@ fn names(reading: &Reading) -> Vec<String> {
     reading.arguments.iter().map(ToString::to_string).collect()
 }
 
-/// Word instance: name, arguments, value (`None`: false).
+/// Value of a predicate or function: name, arguments, value (`None`: false).
 type Instance = (String, Vec<String>, Option<f64>);
 
 /// Parses one atom, negated atom, or value: `(a b)`, `(not (a b))`, `(= (f a) 3)`.
@@ -165,7 +167,7 @@ pub fn read(text: &str) -> Result<Vec<Instance>, String> {
     found.map(|instance| vec![instance]).ok_or_else(expected)
 }
 
-/// True if every name in a condition stands in a problem's text or is a word of the domain.
+/// True if every name in a condition is in a problem's text or declared by the domain.
 pub(crate) fn are_known(condition: &str, problem: &str, domain: &Domain) -> bool {
     let split = |c: char| c.is_whitespace() || "()".contains(c);
     let objects: BTreeSet<&str> = problem.split(split).collect();

@@ -46,19 +46,19 @@ use crate::viewpoint::Candidate;
 use crate::words::{self, Words};
 use crate::{abilities, declared};
 
-/// Message when no choice is left.
+/// Reason given when no choice is left.
 const NOTHING_LEFT: &str = "no look that is left promises to settle anything";
 
-/// Parts of a world.
+/// Inputs of a world.
 #[derive(Clone)]
 pub struct Setting<'a> {
     /// Domain: vocabulary and actions.
     pub domain: &'a Domain,
     /// Goal that is pursued.
     pub goal: &'a Goal,
-    /// The body, which is only asked.
+    /// Body, which is asked for its state and for routes, but not moved here.
     pub robot: Arc<dyn Robot>,
-    /// Everything that is sensed, done and believed.
+    /// Record of everything that is sensed, done and believed.
     pub record: &'a Record,
     /// Recogniser of segments.
     pub recogniser: &'a dyn Recogniser,
@@ -79,19 +79,19 @@ pub struct World<'a> {
     tries: BTreeMap<Call, usize>,
     seen_before: BTreeMap<String, usize>,
     given_up: Option<String>,
-    /// The deed that is planned towards.
+    /// Skill, with its arguments, that the current plan leads to.
     heading_for: Option<Deed>,
     /// True if the steps come from a policy, which does not claim that they suffice.
     is_unasked: bool,
-    /// Deeds that cannot be reached or carried out.
+    /// Skills, with arguments, that cannot be reached or carried out.
     barred: BTreeSet<Deed>,
 }
 
 /// Choice of the next steps, and its maker.
 pub enum Choice {
-    /// The planner.
+    /// The planner chooses.
     Planner,
-    /// Chosen steps.
+    /// Steps chosen without the planner.
     Steps(Plan),
     /// Chosen steps; the planner finds the way to their start.
     Towards {
@@ -182,12 +182,12 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Number of viewpoints in the candidate set.
+    /// Number of candidate viewpoints.
     pub fn poses(&self) -> usize {
         self.mind.known.candidates.len()
     }
 
-    /// Number of views, and metres driven.
+    /// Number of views taken, and distance driven in metres.
     pub fn taken(&self) -> (usize, f64) {
         (self.mind.views, self.mind.distance_m)
     }
@@ -229,7 +229,7 @@ impl<'a> World<'a> {
         self.mind.attend();
     }
 
-    /// The problem of this round in PDDL.
+    /// Planning problem of this round as PDDL text.
     fn problem(&self, s: &Situation) -> Result<Source, WorldError> {
         let domain = self.setting.domain;
         let vocabulary = &domain.vocabulary;
@@ -309,7 +309,8 @@ impl<'a> World<'a> {
     /// Choice of the next steps: by the planner, or by a policy while an object is sought.
     ///
     /// # Errors
-    /// [`WorldError::Domain`] if the domain has no word for being at a pose.
+    ///
+    /// None at present.
     pub fn choice(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
@@ -353,12 +354,12 @@ impl<'a> World<'a> {
         self.is_unasked
     }
 
-    /// States that the search for a plan may evaluate.
+    /// Maximum number of states that the search for a plan may evaluate.
     pub fn most_states(&self) -> u64 {
         self.setting.domain.config.limits.states
     }
 
-    /// A plan was made.
+    /// Counts a plan that was made.
     pub fn planned(&mut self) {
         self.plans += 1;
     }
@@ -424,7 +425,7 @@ impl<'a> World<'a> {
         Ok(said)
     }
 
-    /// Handles completed calls: applies their effects on remembered words and checks their required
+    /// Handles completed calls: applies their effects on remembered facts and checks their required
     /// effects. Returns the calls whose check failed.
     ///
     /// # Errors
@@ -469,7 +470,8 @@ impl<'a> World<'a> {
         Ok(unmet)
     }
 
-    /// Takes in what carried-out steps have revealed: the words stated by programs that their effects set.
+    /// Notes the facts stated by programs that completed steps have revealed: those that the steps'
+    /// effects set.
     fn reveal(&mut self, round: &Round, steps: &Plan) {
         let domain = self.setting.domain;
         let words = domain.vocabulary.words();
@@ -609,12 +611,12 @@ pub struct Job {
     pub limit_s: f64,
 }
 
-/// Name in the domain's text.
+/// Name of the domain in its PDDL text.
 fn domain_name(domain: &Domain) -> &str {
     &domain.vocabulary.task.domain
 }
 
-/// Values of some words at the beginning of a round.
+/// Values of some predicates and functions at the beginning of a round.
 fn initial(round: &Round, names: &[&str]) -> Vec<descry_planner::Reading> {
     after(&round.task, &round.attachments, &Plan::default(), names).unwrap_or_default()
 }

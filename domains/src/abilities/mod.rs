@@ -31,7 +31,8 @@ pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {
         .map(|(_, a)| a)
 }
 
-/// Meaning of a domain's call, if an ability answers the call.
+/// Description of a call that an ability answers; `None` if no used ability does or the domain answers
+/// the call itself.
 pub fn meaning(config: &crate::config::Config, call: &str) -> Option<String> {
     let is_own = config.attachments.contains_key(call);
     let mut calls = used(&config.uses).flat_map(|ability| ability.calls);
@@ -43,7 +44,7 @@ pub fn fact(uses: &[String], name: &str) -> Option<&'static Fact> {
     used(uses).flat_map(|a| a.facts).find(|f| f.name == name)
 }
 
-/// The skill of a name.
+/// Skill with this name among the abilities that a domain uses.
 pub fn skill(uses: &[String], name: &str) -> Option<&'static SkillWord> {
     used(uses).flat_map(|a| a.skills).find(|s| s.name == name)
 }

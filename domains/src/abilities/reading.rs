@@ -44,7 +44,7 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// The sense of a symbol.
+/// Sense of the body with a symbol.
 fn called<'a>(s: &'a Situation, sense: &str) -> Option<&'a descry_robots::Sense> {
     s.robot.description().senses.iter().find(|known| symbol(&known.name) == sense)
 }

@@ -19,7 +19,7 @@ impl Asker<'_> {
         judge.map_or(Judgement { value: Truth::Unknown, word: None }, |judge| judge.goal())
     }
 
-    /// Reason why the truth of the goal cannot be told.
+    /// Sentence on why the truth of the goal cannot be told; `word` is the fact on which it depends.
     pub(super) fn open(&self, word: Option<&Decisive>) -> String {
         let Some(word) = word else {
             return format!("it cannot be told whether {}", self.saying.say(&self.goal.pddl));
@@ -64,7 +64,7 @@ impl Asker<'_> {
         format!("it cannot be told that {thing} is not on the {surface}: {why}")
     }
 
-    /// Reason why looks at a surface are insufficient.
+    /// Reason why the views of a surface are insufficient; `None` if no reason is known.
     fn why_open(&self, on: usize) -> Option<String> {
         let there = Thing { on: Some(vec![on]), ..Thing::default() };
         let looks = self.mind.regions[on].taken;
@@ -85,7 +85,7 @@ impl Asker<'_> {
             .then(|| format!("for the {} {are} shut, and a question opens nothing", shut.join(" and the ")))
     }
 
-    /// Sentence about a word that looks cannot tell and no other source states.
+    /// Sentence about a fact that no view can show and no other source states.
     fn untold(&self, word: &Decisive) -> String {
         let said = word.pddl().map_or_else(|| word.word.clone(), |pddl| self.saying.say(&pddl));
         match word.is_number {
@@ -130,7 +130,7 @@ impl Asker<'_> {
         format!("{denied}: {fact}{}", self.source(word))
     }
 
-    /// Value of a number, in words, with its source.
+    /// Clause on the value of a numeric function, with its source.
     fn value_of(&self, word: &Decisive) -> String {
         let objects: Vec<&str> = word.objects.iter().flatten().map(String::as_str).collect();
         let atom = [&[word.word.as_str()], objects.as_slice()].concat().join(" ");
@@ -138,8 +138,8 @@ impl Asker<'_> {
         format!(": {} is {}{}", self.saying.say(&pddl), self.value(&atom), self.source(word))
     }
 
-    /// Source of a word that looks cannot tell; empty if the source is the body, a program, or an
-    /// action of this run.
+    /// Clause on the source of a fact that no view can show; empty if the source is the body, a program,
+    /// or an action of this run.
     pub(super) fn source(&self, decisive: &Decisive) -> &'static str {
         let name = &decisive.word;
         let Some(word) = self.domain.vocabulary.word(name) else { return "" };
@@ -154,7 +154,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Place of an object that the goal wants absent from there.
+    /// Sentence on an object that stands where the goal wants none; `None` if there is no such object.
     fn stands_against(&self, word: &Decisive) -> Option<String> {
         let s = self.s;
         if !self.goal.asked.denies {
@@ -179,7 +179,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Answer to a question that further actions cannot improve.
+    /// Verdict and sentence for a question that further actions cannot settle better.
     pub(super) fn to_question(&self) -> (Verdict, String) {
         let Judgement { value, word } = self.judgement();
         match value {
@@ -193,8 +193,8 @@ impl Asker<'_> {
         }
     }
 
-    /// Sentence that another object of the kind may stand at the requested place, though one is
-    /// known elsewhere.
+    /// Sentence that another object of the kind may stand at the requested place, though one is known
+    /// elsewhere; `None` if not.
     fn another(&self) -> Option<String> {
         let s = self.s;
         let is_known = |what: usize, on: usize| s.presence(what, on) >= s.threshold;

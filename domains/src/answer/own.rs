@@ -18,7 +18,7 @@ use crate::symbol::symbol;
 const SAME_M: f64 = 0.10;
 
 impl Asker<'_> {
-    /// The phrase's own answer to a verdict.
+    /// Answer to a verdict in the phrase's own words; `None` if the phrase has none.
     pub(super) fn worded(&self, verdict: Verdict) -> Option<String> {
         let Answers { achieved, not_found, cannot_tell } = &self.goal.answer;
         let text = match verdict {
@@ -39,13 +39,14 @@ impl Asker<'_> {
         Some(out + rest)
     }
 
-    /// Changes on a surface since an earlier run.
+    /// Sentence on the changes on a surface since an earlier run.
     fn changes(&self, surface: &str) -> String {
         let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
         changes(&past.remembered, &self.s.belief.tracks, surface, self.lexicon.name_of(surface))
     }
 
-    /// Changes on all surfaces seen by an earlier run, and the surfaces that no earlier run saw.
+    /// Sentence on the changes on all surfaces seen by an earlier run, and on the surfaces that no
+    /// earlier run saw.
     fn all_changes(&self) -> String {
         let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
         let (known, new): (Vec<_>, Vec<_>) =
@@ -56,7 +57,7 @@ impl Asker<'_> {
         told.chain(left_out).collect::<Vec<_>>().join("; ")
     }
 
-    /// Current value of an atom: matching names for its question mark, a number, or yes or no.
+    /// Current value of an atom as text: the names that fit its question mark, a number, or yes or no.
     pub(super) fn value(&self, atom: &str) -> String {
         let tokens: Vec<String> =
             atom.trim_matches(|c| c == '(' || c == ')').split_whitespace().map(str::to_lowercase).collect();
@@ -111,7 +112,7 @@ fn counted(names: Vec<String>) -> String {
     all.into_iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Changes on a surface since an earlier run; `name`: spoken name of the surface.
+/// Sentence on the changes on a surface since an earlier run; `name` is the spoken name of the surface.
 pub fn changes(past: &Remembered, now: &[Track], surface: &str, name: &str) -> String {
     if !past.has_looked_at(surface) {
         return never_seen(name);

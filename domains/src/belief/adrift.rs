@@ -15,17 +15,17 @@ use crate::surface::KnownSurface;
 /// Maximum position error of an object that counts as located, metres: a grasp would miss it
 /// beyond.
 const OFF_M: f64 = 0.03;
-/// Probability of a displacement below which it is neglected.
+/// Probability of a displacement below which the displacement is neglected.
 const NEGLIGIBLE: f64 = 0.01;
 /// Cosine of the largest angle between a direction and the normal of an edge that constrains it.
 const ACROSS: f64 = 0.7;
-/// Spacing of sample points along an edge, metres; the next constants are their distances inside
-/// the edge and above the surface.
+/// Spacing of sample points along an edge, metres.
 const STEP_M: f64 = 0.05;
+/// Distance of these points inside the edge, and above the surface, metres.
 const INSIDE_M: f64 = 0.01;
 
-/// Standard deviation of an object's position in its least certain direction, metres, and that
-/// direction.
+/// Least certain direction of an object's position, if the surface was aligned with the map, and the
+/// standard deviation in that direction, metres.
 pub(crate) fn worst(surface: &KnownSurface, track: &Track) -> (Option<Vector3<f64>>, f64) {
     let own_m = track.position_sigma_m.hypot(surface.displaced_m);
     match &surface.placed {
@@ -37,7 +37,8 @@ pub(crate) fn worst(surface: &KnownSurface, track: &Track) -> (Option<Vector3<f6
     }
 }
 
-/// Probability that an object is displaced along its surface, as far as looks can still reduce it.
+/// Probability that an object is displaced along its surface by more than [`OFF_M`]; 0 if negligible, or
+/// if no view can reduce it.
 pub(crate) fn chance_off(s: &Situation, track: &Track) -> f64 {
     let Some(on) = s.surface_of(track) else { return 0.0 };
     let (Some(_), sigma_m) = worst(&s.surfaces[on], track) else { return 0.0 };
@@ -45,7 +46,8 @@ pub(crate) fn chance_off(s: &Situation, track: &Track) -> f64 {
     if chance < NEGLIGIBLE || s.unseen_ends(on).is_empty() { 0.0 } else { chance }
 }
 
-/// Share of a surface's locating edges that a look shows beyond the earlier looks.
+/// Share of a surface's unseen locating edges that a look (candidate and surface) shows beyond the
+/// earlier looks, 0 to 1.
 pub(crate) fn share_shown(s: &Situation, look: (usize, usize), before: &[(usize, usize)]) -> f64 {
     let ends = s.unseen_ends(look.1);
     let told = |(from, on): (usize, usize), end| s.would_settle(from, on, end, None);
@@ -69,7 +71,7 @@ pub(super) fn ends_of(s: &Situation, track: &Track, weight: f64) -> Vec<Hypothes
 }
 
 /// Unseen edges of a surface that constrain its least certain direction and are visible from a
-/// feasible look.
+/// reachable, unused viewpoint.
 pub(crate) fn unseen_ends(s: &Situation, on: usize) -> Vec<Hypothesis> {
     let surface = &s.surfaces[on];
     let Some((placed, centre)) = surface.placed.as_ref().zip(surface.centre()) else { return Vec::new() };
@@ -84,7 +86,7 @@ pub(crate) fn unseen_ends(s: &Situation, on: usize) -> Vec<Hypothesis> {
     ends.filter(|end| looks().any(|from| s.would_settle(from, on, end, None) > 0.0)).collect()
 }
 
-/// Edge of a surface, if it constrains a direction and is mostly unseen.
+/// Hypothesis of an edge of a surface, if the edge constrains a direction and is mostly unseen.
 fn end(
     s: &Situation,
     on: usize,
@@ -115,12 +117,12 @@ fn end(
 }
 
 impl Situation {
-    /// Unseen edges of a surface that a look could show to locate the surface better.
+    /// Unseen edges of a surface that a view could show to locate the surface better.
     pub(crate) fn unseen_ends(&self, on: usize) -> &[Hypothesis] {
         let ends: &Ends = self.derived.get(&|| Ends(cells(self.surfaces.len())));
         ends.0[on].get_or_init(|| unseen_ends(self, on))
     }
 }
 
-/// Unseen edges of each surface.
+/// Cache of the unseen edges of each surface.
 struct Ends(Vec<OnceLock<Vec<Hypothesis>>>);

@@ -18,7 +18,7 @@ impl Situation {
         self.belief.tracks.iter().map(there).fold(0.0, f64::max)
     }
 
-    /// Object that a thing most probably is, if above one half.
+    /// Object that a thing most probably is, if its probability exceeds one half.
     pub(crate) fn best(&self, what: usize) -> Option<&Track> {
         let p = |t: &Track| self.things[what].probability(t, &self.surfaces);
         let best = self.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
@@ -40,8 +40,7 @@ impl Situation {
             .fold(0.0, f64::max)
     }
 
-    /// Probability that a thing was lost out of the hand and lies where no look at a surface shows
-    /// it.
+    /// Probability that a thing was lost out of the hand and lies where no view of a surface shows it.
     pub fn chance_lost(&self, what: usize) -> f64 {
         let lost = self.belief.mislaid.iter().filter(|t| t.on.is_empty());
         lost.map(|t| self.things[what].probability(t, &self.surfaces)).fold(0.0, f64::max)
@@ -72,15 +71,15 @@ impl Situation {
         self.belief.tracks.iter().map(sure).product::<f64>() * (1.0 - self.doubt_of(of).hidden)
     }
 
-    /// Maximum completeness reachable by looks; objects seen from all sides gain nothing from
-    /// further looks.
+    /// Maximum completeness reachable by views; objects seen from all sides gain nothing from further
+    /// views.
     pub fn most_complete(&self, of: usize) -> f64 {
         let sure = |p: f64| p.max(1.0 - p);
         let told = self.belief.tracks.iter().filter(|track| doubt::is_seen_around(self, track));
         told.map(|track| sure(self.kinds[of].probability(track, &self.surfaces))).product()
     }
 
-    /// True if looks can still raise the completeness of a kind to the required confidence.
+    /// True if views can still raise the completeness of a kind to the required confidence.
     pub fn can_be_complete(&self, of: usize) -> bool {
         self.most_complete(of) >= self.wanted_of(of)
     }
@@ -90,8 +89,8 @@ impl Situation {
         self.belief.tracks.iter().any(|t| self.kinds[of].probability(t, &self.surfaces) > 0.5)
     }
 
-    /// Confidence required to claim that all of a kind are found; at least that of *not there* if
-    /// none exists.
+    /// Confidence required to claim that all of a kind are found; if none was found, at least the
+    /// certainty that *not there* requires.
     pub fn wanted_of(&self, of: usize) -> f64 {
         let is_empty = self.completeness(of) >= self.threshold && !self.has_member(of);
         if is_empty { self.threshold.max(1.0 - self.thresholds.not_there) } else { self.threshold }

@@ -1,7 +1,8 @@
-//! Remaining uncertainty, as hypotheses that a look could settle.
+//! Remaining uncertainty, as hypotheses that a view could settle.
 //!
-//! A thing may stand where nothing has been seen yet, or be one of the objects that were seen from too few sides. Each
-//! such possibility is a [`Hypothesis`] with the probability that hangs on it; a look settles those that it shows.
+//! A thing may stand where nothing has been seen yet, or be one of the objects that were seen from too
+//! few sides. Each such possibility is a [`Hypothesis`], weighted by its probability; a view settles
+//! those that it shows.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -19,7 +20,7 @@ use crate::known::Thing;
 use crate::situation::{Situation, cells};
 use crate::surface::KnownSurface;
 
-/// Sides from which an object is looked at.
+/// Number of sectors around an object by which views of it are distinguished.
 const SECTORS: usize = 8;
 /// Probability below which an object is no longer a candidate for a thing.
 const NEGLIGIBLE: f64 = 0.02;
@@ -29,31 +30,34 @@ const SMALL_M: (f64, f64) = (0.10, 0.07);
 /// Doubt about a thing or a surface: weighted hypotheses.
 #[derive(Debug)]
 pub struct Doubt {
-    /// The possibilities.
+    /// Possibilities with their probabilities as weights.
     pub hypotheses: Vec<Hypothesis>,
     /// Probability that the thing, or any object, is in unseen space.
     pub hidden: f64,
-    /// True if some surface is unknown, so that any look may settle anything.
+    /// True if some surface is unknown, so that any view may settle anything.
     pub anywhere: bool,
     /// Hypotheses by surface.
     parts: BTreeMap<usize, Part>,
-    /// Settled shares with an obstacle moved, by obstacle, candidate and surface.
+    /// Cache of the shares that a view settles once an obstacle is moved, by obstacle, candidate and
+    /// surface.
     told_without: Mutex<BTreeMap<[usize; 3], Arc<[f64]>>>,
-    /// Total weight that all looks can settle, by moved obstacle (0: none).
+    /// Cache of the weight that all views can settle, by moved obstacle: entry 0 for none, entry `n + 1`
+    /// for obstacle `n`.
     within_reach: Vec<OnceLock<Reach>>,
 }
 
 /// Hypotheses on one surface.
 #[derive(Debug, Default)]
 struct Part {
-    /// Possible places of the thing, and those where it may stand unseen; `None` outside the
-    /// requested surfaces.
+    /// Places where the thing may stand on the surface, and those among them where it may stand unseen;
+    /// `None` outside the requested surfaces.
     hidden: Option<Arc<Hidden>>,
-    /// Indices of the hypotheses of hidden places.
+    /// Indices of the hypotheses of hidden places, in [`Doubt::hypotheses`].
     places: Range<usize>,
-    /// Indices of the other hypotheses.
+    /// Indices of the other hypotheses on the surface, about seen objects.
     objects: Vec<usize>,
-    /// Settled shares of all hypotheses, by viewer.
+    /// Cache of the settled shares of all hypotheses on the surface, by index of the viewpoint among
+    /// those that see the surface.
     told: OnceLock<Vec<OnceLock<Arc<[f64]>>>>,
 }
 
@@ -64,20 +68,20 @@ impl Part {
     }
 }
 
-/// Actions of a plan before a look.
+/// Actions of a plan before a view.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Taken<'a> {
-    /// Looks: candidate and surface.
+    /// Views taken: candidate index and surface index of each.
     pub looks: &'a [(usize, usize)],
-    /// The obstacle that is pushed aside.
+    /// Index of the obstacle that is pushed aside, if any.
     pub moved: Option<usize>,
 }
 
-/// Probability mass that looks can still settle.
+/// Probability mass that views can still settle.
 #[derive(Debug, Clone, Copy, Default)]
 struct Reach {
     weight: f64,
-    /// Hypotheses weighted by the clearest look at each.
+    /// Weight settled if each hypothesis is viewed from the viewpoint that shows most of it.
     as_told: f64,
 }
 
@@ -146,9 +150,9 @@ impl Doubt {
         doubt
     }
 
-    /// Moves the hypotheses of a touched object to unseen space around its old place, with the
-    /// probability that the touched object was the thing. An object lost out of the hand lies where
-    /// no look at a surface shows it.
+    /// Shifts weight to unseen places around the old place of each touched object, by the probability
+    /// that the touched object was the thing. An object lost out of the hand lies where no view of a
+    /// surface shows it.
     fn expect_again(&mut self, situation: &Situation, thing: &Thing) {
         for track in &situation.belief.mislaid {
             let p = thing.probability(track, &situation.surfaces);
@@ -170,8 +174,8 @@ impl Doubt {
     }
 
     /// Share of the doubt, 0 to 1, that a look (candidate, surface) would settle beyond the earlier
-    /// steps of the plan. Doubt that no look can settle is excluded; zero if what looks can settle
-    /// is negligible.
+    /// steps of the plan. Doubt that no look can settle is left out of account; zero if what looks can
+    /// settle is negligible.
     pub fn share_settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
         if self.anywhere {
             return if before.looks.is_empty() { 1.0 } else { 0.0 };
@@ -190,15 +194,15 @@ impl Doubt {
         settled / total.as_told
     }
 
-    /// Probability mass that a look would settle beyond the earlier looks of the plan, as far as
-    /// any possible look can.
+    /// Probability mass that a look would settle beyond the earlier looks of the plan, as far as any
+    /// possible look can settle it.
     pub fn settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
         let all = if self.anywhere { 1.0 } else { self.within_reach(situation, before.moved).weight };
         self.share_settled(situation, look, before) * all.min(1.0)
     }
 
-    /// Total weight of the hypotheses that at least one feasible look could settle. Looks already
-    /// taken count only if an object is to be moved.
+    /// Total weight of the hypotheses that at least one reachable look could settle, once the obstacle
+    /// `moved` is out of the way. Looks already taken count only if an obstacle is moved.
     fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> Reach {
         *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
             let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);
@@ -217,21 +221,20 @@ impl Doubt {
         })
     }
 
-    /// True if looking alone can settle anything that matters.
+    /// True if looks alone, without moving an obstacle, can settle enough doubt to be worthwhile.
     pub fn can_be_settled(&self, situation: &Situation) -> bool {
         self.anywhere || self.is_worth_it(situation, self.within_reach(situation, None).weight, None)
     }
 
-    /// True if looks that settle this weight matter: by themselves, or because they would allow the
-    /// claim that nothing is hidden.
+    /// True if looks that settle this weight are worthwhile: by themselves, or because they would allow
+    /// the claim that nothing is hidden.
     fn is_worth_it(&self, situation: &Situation, weight: f64, moved: Option<usize>) -> bool {
         let t = &situation.thresholds;
         let most = t.remaining + t.out_of_sight;
         weight >= negligible(situation, moved) || (self.hidden > most && self.hidden - weight <= most)
     }
 
-    /// True if looks would settle enough doubt that no look can settle now, once an obstacle is
-    /// moved.
+    /// True if moving an obstacle would let looks settle enough doubt that no look can settle now.
     pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
         let [before, after] = [None, Some(what)].map(|moved| self.shown(situation, moved));
         let only_after = |n: &usize| after[*n] && !before[*n];
@@ -240,7 +243,7 @@ impl Doubt {
         uncovered >= negligible(situation, Some(what))
     }
 
-    /// Maximum weight that one feasible look at a surface would settle.
+    /// Maximum weight that one reachable, unused look at a surface would settle.
     pub fn most_settled_on(&self, situation: &Situation, on: usize) -> f64 {
         if self.anywhere {
             return self.hidden;
@@ -269,8 +272,8 @@ impl Doubt {
         Some(1.0 - part.places.len() as f64 / places.max(1) as f64)
     }
 
-    /// Probability that the thing is hidden on a surface, and the part at places with unexplained
-    /// measurements.
+    /// Probability that the thing is hidden on a surface, and the part of that probability at places
+    /// with unexplained measurements.
     pub fn hidden_share(&self, on: usize) -> (f64, f64) {
         let places = self.parts.get(&on).map(|part| part.places.clone()).unwrap_or_default();
         let places = &self.hypotheses[places];
@@ -284,7 +287,7 @@ impl Doubt {
         if self.anywhere { self.hidden } else { all.min(1.0) }
     }
 
-    /// Probability of hidden places that no look can show, and these places.
+    /// Probability of hidden places that no look can show, and the centres of these places.
     pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
         let shown = self.shown(situation, None);
         let hidden = self.hypotheses.iter().zip(shown).filter(|(h, _)| h.facing.is_none());
@@ -303,7 +306,7 @@ impl Doubt {
         shown
     }
 
-    /// Settled shares of every reachable look accepted by `open` at a surface, in hypothesis order.
+    /// Settled share of each hypothesis on a surface, for every reachable look accepted by `open`.
     fn looks_at<'d>(
         &'d self,
         situation: &'d Situation,
@@ -361,8 +364,8 @@ impl Doubt {
         told
     }
 
-    /// Hypotheses of a hidden body of a size on some surfaces, each with a prior factor independent
-    /// of its area; uniform on each surface.
+    /// Doubt about a hidden body (height and diameter `size_m`) on some surfaces, each given with a
+    /// prior factor that does not depend on its area. All places of one surface are equally likely.
     fn hidden_on(situation: &Situation, surfaces: &[(usize, f64)], size_m: (f64, f64)) -> Self {
         let mut all = 0.0;
         let mut anywhere = false;
@@ -412,13 +415,13 @@ impl Doubt {
     }
 }
 
-/// Probability below which doubt is not worth a look; lower for doubt that only moving an obstacle
-/// can settle.
+/// Probability below which doubt is not worth a look; lower for doubt that only moving an obstacle can
+/// settle.
 fn negligible(situation: &Situation, moved: Option<usize>) -> f64 {
     if moved.is_some() { situation.thresholds.out_of_sight } else { situation.thresholds.remaining }
 }
 
-/// Volume of a cylinder of the object's height and diameter, cubic metres.
+/// Product of height and squared diameter, by which cylinders are ordered by volume, cubic metres.
 fn volume_m3((height_m, diameter_m): &(f64, f64)) -> f64 {
     height_m * diameter_m * diameter_m
 }
@@ -429,7 +432,7 @@ fn size_m(model: &ObjectModel) -> (f64, f64) {
     (model.height_m.middle(), across)
 }
 
-/// Unseen sides of an object as hypotheses, each with its share of the object's weight.
+/// Unseen sides of an object as hypotheses, each with an equal share of `weight`.
 fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
     let Some(on) = situation.surface_of(track) else { return Vec::new() };
     let centre = middle(&situation.surfaces[on], track);
@@ -447,7 +450,7 @@ fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypoth
     open.iter().map(hypothesis).collect()
 }
 
-/// Middle of the body of an object on a surface.
+/// Centre of the body of an object on a surface, map frame.
 fn middle(surface: &KnownSurface, track: &Track) -> Point3<f64> {
     track.position_m + surface.up * (track.size_m[2] / 2.0)
 }
@@ -469,12 +472,12 @@ fn open_sides(surface: &KnownSurface, track: &Track) -> Vec<Vector3<f64>> {
     sides.filter(|side| !seen_from(side)).collect()
 }
 
-/// True if an object was seen from all sides, so that further looks add nothing about its identity.
+/// True if an object was seen from all sides, so that further views add nothing about its identity.
 pub(crate) fn is_seen_around(situation: &Situation, track: &Track) -> bool {
     situation.surface_of(track).is_some_and(|on| open_sides(&situation.surfaces[on], track).is_empty())
 }
 
-/// Doubts of a situation, computed on demand.
+/// Cache of a situation's doubts, computed on demand.
 struct Doubts {
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,
@@ -528,14 +531,14 @@ impl Situation {
         self.doubts_kept().on[on].get_or_init(|| Doubt::on(self, on))
     }
 
-    /// True if a look from a candidate may settle a relevant doubt, after an obstacle has been
-    /// moved.
+    /// True if a look from a candidate at a surface may settle a relevant doubt, after the obstacle
+    /// `moved` has been moved.
     pub fn worth_a_look(&self, from: usize, on: usize, moved: Option<usize>) -> bool {
         let taken = Taken { looks: &[], moved };
         self.doubts().iter().any(|doubt| doubt.share_settled(self, (from, on), taken) > 0.0)
     }
 
-    /// True if looks would settle enough doubt after an obstacle is moved.
+    /// True if looks would settle enough further doubt once an obstacle is moved.
     pub(crate) fn would_uncover(&self, what: usize) -> bool {
         self.doubts().iter().any(|doubt| doubt.can_be_settled_without(self, what))
     }

@@ -1,5 +1,5 @@
-//! Places on a surface where an object of a size may stand unseen, and the share of each that a
-//! look settles. Cached from round to round while the observations there stay unchanged.
+//! Places on a surface where an object of a size may stand unseen, and the share of each that a view
+//! settles. Cached from round to round while the observations there stay unchanged.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -11,17 +11,17 @@ use crate::belief::unnoticed::{Unnoticed, around, grid, unseen_volume};
 use crate::situation::Situation;
 use crate::surface::KnownSurface;
 
-/// Likelihood ratio of an object at an unexplained measurement against an unobserved place: the
-/// measurement belongs to some object, perhaps to another.
+/// Likelihood ratio between a place with an unexplained measurement and an unobserved place: the
+/// measurement belongs to some object, perhaps to another one.
 const MEASURED_WEIGHT: f64 = 50.0;
 
-/// Latest hidden places of each object size on one surface.
+/// Cache of the latest hidden places on one surface, by object size.
 #[derive(Debug, Default)]
 struct Places {
     kept: Mutex<Vec<(Given, Arc<Hidden>)>>,
 }
 
-/// Inputs from which hidden places are derived.
+/// Inputs from which the hidden places on a surface are derived.
 #[derive(Debug, Clone)]
 struct Given {
     space: Arc<Space>,
@@ -42,11 +42,12 @@ impl Given {
 /// Places on one surface where an object of one size may stand unseen.
 #[derive(Debug)]
 pub(crate) struct Hidden {
-    /// Number of places where the object can stand.
+    /// Number of places where the object can stand, seen or unseen.
     pub all: usize,
-    /// Hypotheses of the places where the object may stand unseen, with weights.
+    /// Hypotheses of the places where the object may stand unseen, with relative weights.
     pub hypotheses: Vec<Hypothesis>,
-    /// Share of each hypothesis that a look settles, by viewer.
+    /// Cache of the share of each hypothesis that a view settles, by index of the viewpoint among those
+    /// that see the surface.
     told: Vec<OnceLock<Arc<[f64]>>>,
 }
 
@@ -86,8 +87,8 @@ impl Hidden {
         Hidden { all: places.len(), hypotheses, told }
     }
 
-    /// Share of each hypothesis that a look settles; `viewer`: index among the surface's
-    /// viewpoints.
+    /// Share of each hypothesis that a view settles; `viewer` is an index among the viewpoints that see
+    /// the surface.
     pub fn told(&self, situation: &Situation, viewer: usize, on: usize) -> &Arc<[f64]> {
         let from = situation.viewers(on)[viewer];
         let settled = |h: &Hypothesis| situation.would_settle(from, on, h, None);

@@ -1,17 +1,18 @@
-//! Possibilities that a look can settle.
+//! Hypotheses about objects that a view can settle.
 
 use descry_perception::nalgebra::{Point3, Vector3};
 
-/// A possibility that a look can settle.
+/// Possibility that a view can confirm or rule out: an object at a hidden place, or another identity or
+/// position of a seen one.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
-    /// Probability of the hypothesis.
+    /// Probability that depends on the hypothesis.
     pub weight: f64,
-    /// Surface of the hypothesis.
+    /// Index of the surface.
     pub on: usize,
-    /// Position of the hypothesised object.
+    /// Centre of the object, or of the edge that would locate it; map frame.
     pub centre: Point3<f64>,
-    /// Points that must be seen to settle the hypothesis.
+    /// Points of which a view must show most to settle the hypothesis, map frame.
     pub points: Vec<Point3<f64>>,
     /// Side that must be seen, as an outward unit vector; `None`: any side.
     pub facing: Option<Vector3<f64>>,
@@ -26,6 +27,6 @@ pub enum Basis {
     NotSeen,
     /// Measurement that no object explains.
     Measured,
-    /// Seen object that may be the requested one.
+    /// Seen object that may be the requested one, or edge that would locate a seen object.
     Object,
 }

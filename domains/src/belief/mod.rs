@@ -1,4 +1,4 @@
-//! Belief of a situation: possible places of objects, information gain of looks, and certainty.
+//! Belief of a situation: possible places of objects, information gain of views, and certainty.
 
 pub(crate) mod adrift;
 mod confidence;

@@ -1,4 +1,4 @@
-//! Objects that occlude space no look can show, and how a push would move them.
+//! Objects that may hide space from every view, and how a push would move them.
 
 use std::sync::OnceLock;
 
@@ -18,33 +18,34 @@ const GRIP_M: f64 = 0.02;
 const MOST_M: f64 = 0.5;
 /// Margin around an object within which voxels may belong to it, metres.
 const MARGIN_M: f64 = 0.03;
-/// Component of a sideways push towards the body (tangent), so that the object leaves its
-/// neighbours.
+/// Tangent of the angle by which a sideways push is turned towards the body, so that the object leaves
+/// its neighbours.
 const OUTWARDS: f64 = 0.5;
 /// Spacing of the positions along a push that are checked for free space, metres.
 const STEP_M: f64 = 0.02;
 
-/// An object that may be pushed aside.
+/// Object that may be pushed aside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
     /// PDDL symbol.
     pub symbol: String,
-    /// Number of the object's track.
+    /// Identifier of the object in the belief.
     pub track: u64,
-    /// Surface that the obstacle stands on.
+    /// Index of the surface that the obstacle stands on.
     pub on: usize,
-    /// Centre of the footprint.
+    /// Centre of the footprint, map frame.
     pub at: Point3<f64>,
     /// Unit normal of the support.
     pub up: Vector3<f64>,
-    /// Radius of the circle around the footprint, and height, metres.
+    /// Radius of the circle around the footprint, metres.
     pub radius_m: f64,
-    /// See above.
+    /// Height, metres.
     pub height_m: f64,
 }
 
 impl Obstacle {
-    /// True if a point lies within the upright cylinder around the obstacle.
+    /// True if a point lies within the upright cylinder around the obstacle, with a margin of
+    /// [`MARGIN_M`].
     pub(crate) fn covers(&self, p: &Point3<f64>) -> bool {
         let d = p - self.at;
         let above = d.dot(&self.up);
@@ -60,8 +61,8 @@ impl Obstacle {
     }
 }
 
-/// Obstacles that hide relevant space which no look alone can show; empty while a look can settle
-/// doubt.
+/// Objects that may be pushed aside: all small ones on surfaces. None while a look can settle doubt, or
+/// if the body has no arm or no push is left.
 pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
     let alone = situation.doubts().into_iter().any(|doubt| doubt.can_be_settled(situation));
     let body = situation.robot.description();
@@ -84,9 +85,9 @@ pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
     situation.belief.tracks.iter().filter(small).filter_map(known).collect()
 }
 
-/// Push by which a body at a candidate moves an obstacle aside: touches the facing side and moves
-/// it across the line of sight and slightly towards the body, to the freer side. `None` if out of
-/// the arm's reach.
+/// Push by which a body at a candidate moves an obstacle aside: touches the facing side and moves it
+/// across the line of sight and slightly towards the body, to the freer side. `None` out of the arm's
+/// reach, or if that push failed before.
 pub fn push(situation: &Situation, from: usize, obstacle: &Obstacle) -> Option<Push> {
     let Place::Pose(base) = &situation.candidates[from].place else { return None };
     if situation.stuck.contains(&(obstacle.track, from)) {
@@ -122,15 +123,16 @@ fn obstructions(situation: &Situation, obstacle: &Obstacle, from: &Point3<f64>, 
 }
 
 impl Situation {
-    /// Obstacles worth pushing aside; empty while a look alone can settle doubt.
+    /// Objects that may be pushed aside; none while a look can settle doubt.
     pub fn obstacles(&self) -> &[Obstacle] {
         let obstacles: &Obstacles = self.derived.get(&Obstacles::default);
         obstacles.0.get_or_init(|| all(self))
     }
 
-    /// The obstacle of a symbol.
+    /// Index of the obstacle with a symbol.
     ///
     /// # Errors
+    ///
     /// [`CallError::Failed`] if there is none.
     pub fn obstacle(&self, name: &str) -> Result<usize, CallError> {
         situation::find(
@@ -140,13 +142,13 @@ impl Situation {
         )
     }
 
-    /// Obstacle that the plan pushes aside before a call, from the `pushed` facts in the call's
-    /// readings.
+    /// Index of the obstacle that the plan pushes aside before a call, from the `pushed` facts that the
+    /// call reads.
     pub(crate) fn planned_push(&self, call: &Call) -> Option<usize> {
         holding(call, "pushed").find_map(|r| self.obstacle(r.arguments.first()?).ok())
     }
 }
 
-/// Obstacles of a situation.
+/// Cache of the obstacles of a situation.
 #[derive(Default)]
 struct Obstacles(OnceLock<Vec<Obstacle>>);

@@ -1,4 +1,4 @@
-//! Visibility: which looks show which surfaces, and how much of a hypothesis they settle.
+//! Visibility: which views show which surfaces, and how much of a hypothesis they settle.
 
 use descry_perception::nalgebra::{Isometry3, Point2, Point3, Vector3};
 use descry_perception::noise::axial_sigma_m;
@@ -9,20 +9,22 @@ use crate::situation::Situation;
 
 /// Distance before a hypothesis's centre at which its line of sight ends, metres.
 const BEFORE_M: f64 = 0.05;
-/// Distance before a hypothesis within which unseen space may hide an occluder, metres; the next
-/// constant is the mean free path of sight through unseen space.
+/// Distance before a hypothesis within which unseen space may hide an occluder, metres.
 const UNSEEN_WITHIN_M: f64 = 0.4;
+/// Mean free path of a line of sight through unseen space, metres.
 const FREE_PATH_M: f64 = 0.5;
-/// Minimum clearness of a useful look at a known surface; reached up to about three metres with a
+/// Minimum clearness of a useful view of a known surface; reached up to about three metres with a
 /// Kinect.
 const CLEAR_ENOUGH: f64 = 0.1;
 /// Size of the smallest distinguishing feature, the wall of a cup's handle, metres.
 const SMALLEST_M: f64 = 0.01;
-/// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector still counts as seen.
+/// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector
+/// still counts as seen.
 const SECTOR_COSINE: f64 = 0.5;
 
 impl Situation {
-    /// Pose of the camera if the body stood at a candidate and looked at a surface.
+    /// Pose of the camera in the map if the body stood at a candidate and looked at a surface; `None` if
+    /// it cannot.
     pub fn camera(&self, from: usize, on: usize) -> Option<Isometry3<f64>> {
         *self.geometry.sight(on).cameras[from].get_or_init(|| {
             let centre = self.surfaces[on].centre();
@@ -30,19 +32,18 @@ impl Situation {
         })
     }
 
-    /// True if a look from a candidate shows any part of a surface, or may while the surface is
-    /// unknown.
+    /// True if a view from a candidate shows any part of a surface, or may while the surface is unknown.
     pub fn sees(&self, from: usize, on: usize) -> bool {
         self.viewers(on).binary_search(&from).is_ok()
     }
 
-    /// Candidates from which a look shows any of a surface, in order.
+    /// Indices of the candidates from which a view shows any part of a surface, in order.
     pub fn viewers(&self, on: usize) -> &[usize] {
         let all = || (0..self.candidates.len()).filter(|&from| self.shows(from, on)).collect();
         self.geometry.sight(on).viewers.get_or_init(all)
     }
 
-    /// Looks that show anything, each a candidate and a surface, in order.
+    /// Looks that show anything, each a candidate index and a surface index, in order.
     pub fn all_looks(&self) -> Vec<(usize, usize)> {
         let surfaces = 0..self.surfaces.len();
         let mut looks: Vec<(usize, usize)> =
@@ -70,7 +71,7 @@ impl Situation {
             .any(|p| self.in_view(&camera, &p) && !self.is_walled_off(&eye, &p.xy()))
     }
 
-    /// Clearness of a look at objects on a surface, 0 to 1: weight of a depth measurement (a Kalman
+    /// Clearness of a view of objects on a surface, 0 to 1: weight of a depth measurement (a Kalman
     /// gain) for resolving half of the smallest distinguishing feature.
     pub(crate) fn clearness(&self, from: usize, on: usize) -> f64 {
         let middle = self.camera(from, on).zip(self.surfaces[on].centre());
@@ -86,9 +87,9 @@ impl Situation {
         camera.is_some_and(|camera| camera.shows(&map_from_camera.inverse_transform_point(point)))
     }
 
-    /// Share of a hypothesis that a look would settle, 0 to 1: zero unless most of its points are
-    /// in view and unoccluded (apart from an obstacle moved before); else clearness times the
-    /// probability that unseen space in front is empty.
+    /// Share of a hypothesis that a view from a candidate would settle, 0 to 1: zero unless most of its
+    /// points are in view and unoccluded (apart from the obstacle `moved`); else the view's clearness
+    /// times the probability that unseen space in front is empty.
     pub(crate) fn would_settle(
         &self,
         from: usize,
@@ -127,7 +128,7 @@ fn halfway(a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
 }
 
 impl Situation {
-    /// True if a wall of the map, or a door believed shut, stands between two places.
+    /// True if a wall of the map, or a door believed shut, stands between two points.
     pub(crate) fn is_walled_off(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         self.geometry.walls().stand_between(&self.shut, from, to)
     }

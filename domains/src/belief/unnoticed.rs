@@ -24,23 +24,24 @@ const MEASURED_SHARE: f64 = 1.0 / 3.0;
 /// Maximum free share of an object's volume at such measurements: from afar, rims are cut off and
 /// noise frays the rest.
 const FRAYED_SHARE: f64 = 0.5;
-/// Height above an object's foot, in heights of the object, from which a measured column is too high to be of
-/// the object; and the distance from a wall, in voxels, within which it belongs to the wall. Within a voxel
-/// of where walls are removed from the clouds, everything is wall.
+/// Height above which a measured column is too high to belong to an object, in heights of the object
+/// from its foot.
 const ABOVE: f64 = 1.5;
+/// Distance from a wall, in voxels, within which a column that is measured even above the object belongs
+/// to the wall; within one voxel, every column does.
 const WALL_BLUR: f64 = 3.0;
-/// Probability above which an object is not the blur of two.
+/// Minimum certainty of an identified object for the object not to be the blur of two.
 const SURE: f64 = 0.8;
 /// Length, in diameters of the requested object, above which an unidentified object may be several.
 const LARGE: f64 = 2.0;
-/// Height above an unseen place in which the top of a solid body is sought, metres.
+/// Height range above an unseen point in which the top of a solid body is sought, metres.
 const ROOF_M: f64 = 0.5;
-/// Sample columns of an object's volume: offsets in diameters from the axis. Levels: in heights
-/// from the foot.
+/// Sample columns of an object's volume: offsets from the axis, in diameters.
 const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
+/// Levels of the samples in each column, in heights of the object from its foot.
 const LEVELS: [f64; 3] = [0.25, 0.6, 0.95];
 
-/// Two unit vectors that span a surface.
+/// Two orthogonal unit vectors that span a surface.
 pub(super) fn across(surface: &KnownSurface) -> (Vector3<f64>, Vector3<f64>) {
     let helper = if surface.up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     let first = surface.up.cross(&helper).normalize();
@@ -63,7 +64,7 @@ pub(crate) fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> 
         .collect()
 }
 
-/// Places that represent a grid cell, nearest to the centre first.
+/// Sample points of the grid cell around a place, beginning near its centre.
 pub(crate) fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = Point3<f64>> {
     const STEPS: [f64; 4] = [-0.125, 0.125, -0.375, 0.375];
     let (e1, e2) = across(surface);
@@ -80,9 +81,9 @@ pub struct Unnoticed {
     pub likely: bool,
 }
 
-/// Unobserved volume of an object at a place, if it could stand there unnoticed. Measurements that
-/// belong to no believed object may be its own; those close to a believed object may belong to
-/// that.
+/// Unobserved volume of an object (height, diameter) at a place, if the object could stand there
+/// unnoticed. Measurements that no believed object explains may belong to the unnoticed one; those close
+/// to a believed object may belong to that one.
 pub fn unseen_volume(
     surface: &KnownSurface,
     space: &Space,
@@ -160,7 +161,7 @@ pub fn unseen_volume(
     ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(Unnoticed { points: unseen, likely })
 }
 
-/// True if a point lies outside the round body fitted to an object.
+/// True if a point lies outside the round body fitted to an object; false if none was fitted.
 fn is_beyond_body(track: &Track, point: &Point3<f64>, up: &Vector3<f64>, margin_m: f64) -> bool {
     let radius_m = track.evidence.radius_m;
     radius_m > 0.0 && (point - track.position_m).cross(up).norm() > radius_m + margin_m

@@ -1,4 +1,4 @@
-//! Every action is carried out by something, every call is answered.
+//! Checks that every action is carried out by a skill or program, and that every call is answered.
 
 use descry_planner::{Diagnostic, Span};
 use descry_skills::Call;
@@ -10,7 +10,7 @@ use crate::actions::{doer, substituted};
 use crate::config::ActionConfig;
 use crate::origin::{self, Origin};
 
-/// The kinds of failure that may teach something.
+/// Kinds of failure for which a domain may state lessons.
 const FAILURES: [&str; 12] = [
     "unreachable",
     "blocked",
@@ -47,7 +47,7 @@ impl Check<'_> {
         list
     }
 
-    /// Checks for words that an ability reads by name and the domain does not remember.
+    /// Warns of predicates that an ability reads by name and the domain does not remember.
     pub(super) fn traces(&self) -> Vec<Diagnostic> {
         let vocabulary = &self.domain.vocabulary;
         let is_type = |of: &&str| vocabulary.task.types.iter().any(|known| known.name == **of);
@@ -69,7 +69,7 @@ impl Check<'_> {
         missed.filter_map(finding).collect()
     }
 
-    /// Skill or program that carries an action out.
+    /// Checks the skills, or the program, that carry an action out.
     fn performed(
         &self,
         name: &str,
@@ -106,7 +106,7 @@ impl Check<'_> {
         texts.iter().filter_map(step).collect()
     }
 
-    /// Checks one step of an action.
+    /// Checks one step of an action: the skill exists and takes these arguments.
     fn step(&self, action: &str, text: &str, span: Span, label: &str) -> Option<Diagnostic> {
         let mut tokens = text.split_whitespace();
         let name = tokens.next().unwrap_or_default();
@@ -188,7 +188,7 @@ impl Check<'_> {
         list
     }
 
-    /// Checks that the lesson of a failing action is about a remembered word.
+    /// Checks that a lesson from a failing action is one atom of a remembered predicate or function.
     fn teaches(&self, action: &str, path: &[&str], atom: &str) -> Option<Diagnostic> {
         let (condition, objects) = self.over(action, atom);
         if let Some(fault) = self.condition(path, &condition, &objects) {

@@ -1,4 +1,4 @@
-//! Conditions in `domain.toml`, held against the domain by the planner's own reading.
+//! Checks of the conditions in `domain.toml`, by the planner's own parser.
 
 use descry_planner::{Diagnostic, Severity, Source};
 
@@ -13,7 +13,8 @@ impl Check<'_> {
         self.aim(&["minimise"], "", &format!("(:goal (and)) (:metric minimize {expression})"))
     }
 
-    /// Checks a condition over the domain's words, its objects and further ones (name, type).
+    /// Checks a condition over the domain's predicates and functions, its objects and the further
+    /// objects `more` (name, type).
     pub(super) fn condition(
         &self,
         path: &[&str],
@@ -63,7 +64,7 @@ impl Check<'_> {
         Some(told)
     }
 
-    /// The type that a condition wants of an object.
+    /// Type that a condition requires of an object; `object` if no predicate or function tells.
     pub(super) fn type_where(&self, condition: &str, object: &str) -> String {
         let vocabulary = &self.domain.vocabulary;
         let of = |mention: Vec<String>| {

@@ -9,7 +9,7 @@ use crate::mentions::mentions;
 use crate::slots::{slots_of, type_of_slot};
 
 impl Check<'_> {
-    /// Faults of the `n`-th phrase by which a part would never be understood.
+    /// Faults of the `n`-th phrase by which some part of it would never be understood.
     pub(super) fn unheard(&self, n: usize, phrase: &GoalPhrase) -> Vec<Diagnostic> {
         let unused = slots_of(&phrase.say).into_iter().filter(|slot| !is_used(phrase, slot));
         let unused = unused.map(|slot| {
@@ -25,7 +25,7 @@ impl Check<'_> {
         unused.chain(otherwise.into_iter().flatten()).collect()
     }
 
-    /// Fault of a phrase whose meaning is always true.
+    /// Fault of a phrase whose meaning names no predicate or function, so that it holds at once.
     fn asks_for_nothing(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
         let place = self.toml.at(&["goal", &n.to_string(), "means"]);
         let message = "this asks for nothing: it holds before anything is done".to_string();
@@ -35,8 +35,8 @@ impl Check<'_> {
         is_empty.then(|| self.error("no-goal", message, place, help))
     }
 
-    /// Fault of a phrase that contains the words of confidence and deadline, which may end every
-    /// goal.
+    /// Fault of a phrase without words, or with the words that introduce confidence and deadline, which
+    /// may end every goal.
     fn never_said(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
         let ends = |say: &str| {
             let words = shape(say);
@@ -69,7 +69,7 @@ impl Check<'_> {
         None
     }
 
-    /// Span of a wording of the `n`-th phrase, or of a part of it.
+    /// Span of a wording of the `n`-th phrase (`way` 0: the usual one), or of a part of that wording.
     fn way(&self, n: usize, way: usize, part: &str) -> Span {
         let n = n.to_string();
         match way.checked_sub(1) {

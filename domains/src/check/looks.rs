@@ -1,5 +1,5 @@
-//! Checks of looks: goals that need a looking action the domain lacks, questions nothing answers,
-//! and indistinguishable objects.
+//! Checks of what views can tell: goals that need a looking action the domain lacks, questions that
+//! nothing answers, and indistinguishable objects.
 
 use descry_planner::{Diagnostic, Source, Span};
 
@@ -14,14 +14,14 @@ use crate::origin::{self, Origin};
 use crate::slots::put_in;
 use crate::{actions, judge};
 
-/// Object files as sources of findings.
+/// Texts of the object files, as sources of findings.
 pub(super) fn objects(domain: &Domain) -> Vec<Source> {
     let files = domain.files.iter().filter(|(key, _)| key.starts_with("objects/"));
     files.map(|(_, (shown, text))| Source::new(shown.clone(), text.clone())).collect()
 }
 
 impl Check<'_> {
-    /// Findings on known objects with equal shape and size.
+    /// Findings on known objects that may have equal shape, size and colour.
     pub(super) fn alike(&self, first_source: usize) -> Vec<Diagnostic> {
         let files = objects(self.domain);
         let mut list = Vec::new();
@@ -48,7 +48,8 @@ impl Check<'_> {
         list
     }
 
-    /// Faults of a phrase that needs looks which no action takes, or facts that no look tells.
+    /// Faults of a phrase that needs views which no action takes, or that asks for facts which nothing
+    /// tells.
     pub(super) fn untellable(&self, n: &str, phrase: &GoalPhrase, filled: &[Filled]) -> Vec<Diagnostic> {
         let means = phrase.means.replace("<threshold>", "0.5");
         let Ok(goal) = put_in(&means, filled, |f| f.symbol.clone()) else { return Vec::new() };
@@ -63,7 +64,7 @@ impl Check<'_> {
         self.without_looks(&asked, place).into_iter().chain(self.never_told(phrase, &asked, place)).collect()
     }
 
-    /// Fault of a goal about seen objects in a domain without an action that looks.
+    /// Fault of a goal about seen objects in a domain without an action that takes views.
     fn without_looks(&self, asked: &Asked, place: Span) -> Option<Diagnostic> {
         let is_seen = !(asked.things.is_empty() && asked.kinds.is_empty() && asked.surfaces.is_empty());
         let uses = &self.domain.config.uses;
@@ -78,7 +79,7 @@ impl Check<'_> {
         Some(Diagnostic::warning("no-look", message, place, "here").with_help(help))
     }
 
-    /// Fault of a question about a word that neither looks nor another source tell.
+    /// Fault of a question about a fact that neither views nor another source tell.
     fn never_told(&self, phrase: &GoalPhrase, asked: &Asked, place: Span) -> Option<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let is_told = |name: &String| {

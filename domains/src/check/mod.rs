@@ -21,7 +21,7 @@ use crate::toml_place::TomlPlaces;
 /// Checks that a domain can be run.
 ///
 /// # Errors
-/// The findings that are faults.
+/// The findings of severity error.
 pub fn runnable(domain: &Domain) -> Result<(), Findings> {
     let mut findings = findings(domain);
     findings.list.retain(|f| f.severity == Severity::Error);
@@ -49,7 +49,8 @@ pub fn findings(domain: &Domain) -> Findings {
     Findings { sources, list }
 }
 
-/// The grounding of each word, call and action of a domain, a line each.
+/// One line for each predicate, function, call and action of a domain, with what states, answers or
+/// carries it out.
 pub fn grounding(domain: &Domain) -> Vec<String> {
     let vocabulary = &domain.vocabulary;
     let mut lines = vec!["words:".to_string()];
@@ -97,7 +98,7 @@ pub fn grounding(domain: &Domain) -> Vec<String> {
     lines
 }
 
-/// Context of the checks.
+/// Domain and tables that the checks use.
 struct Check<'a> {
     domain: &'a Domain,
     toml: TomlPlaces<'a>,
@@ -115,8 +116,8 @@ impl Check<'_> {
         format!("{hint}known: {}", if names.is_empty() { "none".into() } else { names.join(", ") })
     }
 
-    /// Checks that a program can be started: its command and script file exist. Functions need
-    /// neither.
+    /// Checks that a program can be started: its command and script file exist. A function in place of
+    /// the program needs neither.
     fn program(&self, path: &[&str], program: &[String]) -> Option<Diagnostic> {
         let here = self.toml.at(path);
         let Some((command, arguments)) = program.split_first() else {
@@ -155,7 +156,7 @@ impl Check<'_> {
         )
     }
 
-    /// A fault with a mend.
+    /// Error finding with a suggested remedy.
     fn error(&self, code: &'static str, message: String, at: Span, help: impl Into<String>) -> Diagnostic {
         Diagnostic::error(code, message, at, "here").with_help(help)
     }

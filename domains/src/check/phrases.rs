@@ -12,7 +12,7 @@ use crate::slots::{put_in, slots_of, type_of_slot};
 use crate::symbol::SENSE;
 
 impl Check<'_> {
-    /// Every phrase.
+    /// Checks every phrase of the domain.
     pub(super) fn phrases(&self) -> Vec<Diagnostic> {
         let phrases = self.domain.config.goal.iter().enumerate();
         let all = phrases.flat_map(|(n, phrase)| {
@@ -75,7 +75,7 @@ impl Check<'_> {
         list
     }
 
-    /// Example values for the slots of a phrase.
+    /// Example values for the slots of a phrase, or the faults of its slots.
     fn filled(&self, n: &str, phrase: &GoalPhrase) -> Result<Vec<Filled>, Vec<Diagnostic>> {
         let mut filled: Vec<Filled> = Vec::new();
         let mut faults = Vec::new();
@@ -103,7 +103,7 @@ impl Check<'_> {
         if faults.is_empty() { Ok(filled) } else { Err(faults) }
     }
 
-    /// Slots that nothing can fill, independent of the body.
+    /// Warnings about slots that no object can fill, whatever the body.
     fn unnamed(&self, n: &str, filled: &[Filled]) -> Vec<Diagnostic> {
         let is_body_s = |of: &str| {
             of == SENSE || ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty()

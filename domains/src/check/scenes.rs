@@ -9,11 +9,10 @@ use crate::lexicon::TOLD_APART;
 use crate::load::Domain;
 use crate::symbol::symbol;
 
-/// Number of the first scene among the sources of the findings, behind `domain.pddl` and
-/// `domain.toml`.
+/// Index of the first scene among the sources of the findings, behind `domain.pddl` and `domain.toml`.
 const FIRST_SCENE: usize = 2;
 
-/// The scenes as sources of findings.
+/// Texts of the scenes, as sources of findings.
 pub(super) fn scenes(domain: &Domain) -> Vec<Source> {
     let source = |(name, text): (&String, &String)| {
         let path = format!("scenes/{name}.toml");
@@ -23,7 +22,7 @@ pub(super) fn scenes(domain: &Domain) -> Vec<Source> {
     domain.scenes.iter().map(source).collect()
 }
 
-/// The byte at a line and a column, both from 1.
+/// Byte offset of a line and a column, both counted from 1.
 fn byte(text: &str, line: usize, column: usize) -> usize {
     let before: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
     let within = text[before..].char_indices().nth(column.saturating_sub(1));
@@ -31,8 +30,8 @@ fn byte(text: &str, line: usize, column: usize) -> usize {
 }
 
 impl Check<'_> {
-    /// Checks that the default scene exists, and that every scene can be read and names existing
-    /// surfaces, rooms and objects.
+    /// Checks that the default scene exists, that every scene can be read, and that surfaces and
+    /// expected objects named in `domain.toml` exist.
     pub(super) fn scenes(&self) -> Vec<Diagnostic> {
         let (domain, config) = (self.domain, &self.domain.config);
         let mut list = Vec::new();

@@ -1,5 +1,5 @@
-//! Checks that every word has a source of values, and that the entries on words and objects in
-//! `domain.toml` are valid.
+//! Checks that every predicate and function has a source of values, and that the entries on them and on
+//! objects in `domain.toml` are valid.
 
 use std::collections::BTreeMap;
 
@@ -15,8 +15,8 @@ use crate::{abilities, words};
 const GIVEN: [&str; 8] = ["pose", "surface", "room", "door", "thing", "kind", "obstacle", SENSE];
 
 impl Check<'_> {
-    /// Checks that words stated by an ability have the ability's types, and that words nothing
-    /// changes have an initial value.
+    /// Checks that predicates and functions stated by an ability have the ability's types, and that
+    /// those which nothing changes have an initial value.
     pub(super) fn words(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -89,7 +89,8 @@ impl Check<'_> {
         list
     }
 
-    /// Checks that what tells that a word is not known yet is a predicate of the same arguments.
+    /// Checks that the predicate `untold`, which marks values not known yet, has the arguments of the
+    /// predicate that it marks.
     fn untold(&self, name: &str, untold: &str) -> Option<Diagnostic> {
         let vocabulary = &self.domain.vocabulary;
         let (own, other) = (vocabulary.word(name)?, vocabulary.word(untold));
@@ -105,7 +106,8 @@ impl Check<'_> {
         Some(self.error("untold", message, self.toml.at(&["word", name, "untold"]), help))
     }
 
-    /// Checks that each line of `[said]` names an action, word or call, and uses its parameters.
+    /// Checks that each line of `[said]` names an action, predicate, function or call, and uses its
+    /// parameters.
     fn said(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -127,7 +129,8 @@ impl Check<'_> {
         list
     }
 
-    /// Checks that the variables of a text for people are parameters of its action, word or call.
+    /// Checks that the variables of a text for people are parameters of its action, predicate, function
+    /// or call.
     pub(super) fn marks(
         &self,
         name: &str,
@@ -150,14 +153,14 @@ impl Check<'_> {
         unknown.map(told).collect()
     }
 
-    /// True for a number without an initial value or an action that assigns one.
+    /// True for a numeric function without an initial value or an action that assigns one.
     fn stays_undefined(&self, word: &Word) -> bool {
         // Costs begin at 0.
         let is_cost = word.name == "total-cost" && word.types.is_empty();
         word.is_number && !is_cost && !self.begins(word) && !self.domain.vocabulary.is_given(&word.name)
     }
 
-    /// True if a number without an initial value is compared in an action's condition.
+    /// True if a numeric function without an initial value is compared in an action's condition.
     fn is_compared_unset(&self, word: &Word) -> bool {
         let vocabulary = &self.domain.vocabulary;
         word.is_number && !self.begins(word) && vocabulary.is_compared(&word.name)
@@ -168,7 +171,8 @@ impl Check<'_> {
         lines.flatten().any(|(name, ..)| name == word.name)
     }
 
-    /// Checks that `init` has existing objects, and words that are not sensed.
+    /// Checks that `init` names existing objects, sets nothing that is sensed, and gives nothing two
+    /// values.
     fn init(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -215,7 +219,7 @@ impl Check<'_> {
         list
     }
 
-    /// Checks that the types with freely named objects exist.
+    /// Checks that the types whose objects may be named freely (`open`) exist.
     pub(super) fn open(&self) -> Vec<Diagnostic> {
         let vocabulary = &self.domain.vocabulary;
         let types = || vocabulary.task.types.iter().map(|t| t.name.as_str());
@@ -228,7 +232,8 @@ impl Check<'_> {
         unknown.map(told).collect()
     }
 
-    /// The abilities that are used, and the objects of the domain's own types.
+    /// Checks that the used abilities exist, and that objects of the domain's own types have valid,
+    /// unique names.
     pub(super) fn objects(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -274,7 +279,7 @@ impl Check<'_> {
     }
 }
 
-/// Fault of a number that is compared before it has a value.
+/// Warning about a numeric function that an action compares before it has a value.
 fn not_begun(word: &Word) -> Diagnostic {
     let name = &word.name;
     let arguments = if word.types.is_empty() { "" } else { " …" };
@@ -284,7 +289,7 @@ fn not_begun(word: &Word) -> Diagnostic {
     Diagnostic::warning("no-value", message, word.span, "this number").with_help(help)
 }
 
-/// Fault of a number that is read or added to, and never has a value.
+/// Error about a numeric function that is read or changed and never has a value.
 fn never_defined(word: &Word) -> Diagnostic {
     let name = &word.name;
     let arguments = if word.types.is_empty() { "" } else { " …" };

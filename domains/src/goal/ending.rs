@@ -38,7 +38,8 @@ pub(super) fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError>
     }
 }
 
-/// Words with every wording of a confidence as "with confidence 0.9": "with 90% confidence", "and be 90 % sure".
+/// Words in which every wording of a confidence, as "with 90% confidence" or "and be 90 % sure", has
+/// become "with confidence 0.9".
 fn usual(mut words: Vec<String>) -> Vec<String> {
     const AROUND: [(&str, &[&str]); 2] =
         [("with", &["confidence", "certainty"]), ("be", &["sure", "certain"])];
@@ -58,7 +59,7 @@ fn usual(mut words: Vec<String>) -> Vec<String> {
     words
 }
 
-/// "0.9", "90%", "90 percent".
+/// Parses a probability: "0.9", "90%", "90 percent"; `None` for other words.
 fn probability(words: &str) -> Option<f64> {
     let percent = ["%", "percent", "per cent"].iter().find_map(|sign| words.strip_suffix(sign));
     let number: f64 = percent.unwrap_or(words).trim().parse().ok()?;
@@ -70,12 +71,12 @@ fn ended(words: &[String]) -> String {
     english::unlisted(english::without_endings(words)).join(" ")
 }
 
-/// Checks that a condition is given only once.
+/// Checks that a condition was not given before (`other`).
 fn once(other: Option<f64>, condition: &'static str, example: &'static str) -> Result<(), GoalError> {
     other.map_or(Ok(()), |_| Err(GoalError::SaidTwice { condition, example }))
 }
 
-/// Parses "0.9" or "90%"; must exceed one half.
+/// Parses a confidence, "0.9" or "90%", which must be above one half and below 1.
 fn confidence_of(found: String) -> Result<f64, GoalError> {
     match probability(&found) {
         Some(c) if c > 0.5 && c < 1.0 => Ok(c),
@@ -101,7 +102,8 @@ const NUMBERS: [(&str, f64); 13] = [
     ("sixty", 60.0),
 ];
 
-/// "60 s", "60s", "60 seconds", "1.5 minutes", "half an hour"; a number alone may be meant as any.
+/// Parses a duration into seconds: "60 s", "60s", "60 seconds", "1.5 minutes", "half an hour". A number
+/// alone is an error, as its unit is open.
 fn seconds(found: String) -> Result<f64, GoalError> {
     let said = found.strip_prefix("the next ").unwrap_or(&found);
     let digits = said.find(|c: char| c.is_alphabetic()).unwrap_or(said.len());

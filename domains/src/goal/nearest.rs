@@ -8,7 +8,7 @@ use crate::lexicon::Lexicon;
 use crate::load::Domain;
 use crate::slots::type_of_slot;
 
-/// Suggestions at most.
+/// Maximum number of suggestions.
 const SHOWN: usize = 2;
 /// Number of leading words considered in a long sentence.
 const HEARD: usize = 24;
@@ -23,7 +23,7 @@ const MISTYPED: f64 = 0.34;
 struct Mention {
     of_type: String,
     name: String,
-    /// Word positions of the name.
+    /// Positions of the name among the words said.
     at: Range<usize>,
     is_exact: bool,
     /// True if the name is a source: "from the desk".
@@ -33,9 +33,9 @@ struct Mention {
 /// Phrase with its similarity to the words.
 struct Candidate {
     text: String,
-    /// Words that occur neither in the phrase nor in a name.
+    /// Words said that occur neither in the phrase nor in a name.
     left: Vec<String>,
-    /// True if all names in the phrase were given, at least one.
+    /// True if the phrase has names and all of them were given.
     is_named: bool,
     score: f64,
 }
@@ -44,11 +44,11 @@ struct Candidate {
 pub(super) struct Nearest {
     /// Suggested goals, nearest first.
     pub(super) goals: Vec<String>,
-    /// Words that the nearest suggestion lacks.
+    /// Words said that the nearest suggestion lacks.
     pub(super) left: String,
 }
 
-/// The goals that are nearest to words, in plain form.
+/// Goals of the domain that are nearest to the words said.
 pub(super) fn nearest(words: &[String], domain: &Domain, lexicon: &Lexicon) -> Nearest {
     let words = &words[..words.len().min(HEARD)];
     let exact = mentions(words, domain, lexicon, true);
@@ -75,7 +75,7 @@ pub(super) fn nearest(words: &[String], domain: &Domain, lexicon: &Lexicon) -> N
     Nearest { goals: shown.into_iter().map(|c| c.text).collect(), left }
 }
 
-/// Names among the words, the longest first: exact, or mistyped.
+/// Known names among the words, the longest first: exactly as said, or mistyped if not `is_exact`.
 fn mentions(words: &[String], domain: &Domain, lexicon: &Lexicon, is_exact: bool) -> Vec<Mention> {
     let mut types = spoken_types(domain);
     types.push("kind");
@@ -112,20 +112,21 @@ pub(super) fn has_name(words: &str, domain: &Domain, lexicon: &Lexicon) -> bool 
     !mentions(&words, domain, lexicon, true).is_empty()
 }
 
-/// Name that a mistyped word probably means.
+/// Known name that mistyped words probably mean.
 fn mistyped<'n>(names: impl Iterator<Item = &'n String>, found: &str) -> Option<String> {
     let distance = |name: &String| strsim::damerau_levenshtein(&name.to_lowercase(), found);
     let nearest = names.min_by_key(|name| distance(name))?;
     is_mistyped(found, &nearest.to_lowercase()).then(|| nearest.clone())
 }
 
-/// True if few letters differ.
+/// True if at most a share of [`MISTYPED`] of the letters differ.
 fn is_mistyped(found: &str, wanted: &str) -> bool {
     let letters = wanted.chars().count().max(found.chars().count());
     strsim::damerau_levenshtein(found, wanted) as f64 <= MISTYPED * letters as f64
 }
 
-/// Similarity of a phrase's word to the most similar given word, with that word's index.
+/// Index of the unused given word that is most similar to a phrase's word, and their similarity, up to
+/// 2.
 fn likeness(wanted: &str, words: &[String], used: &[bool]) -> Option<(usize, f64)> {
     let of = |word: &str| match word {
         same if english::is_same(same, wanted) => 2.0,

@@ -1,4 +1,5 @@
-//! A sentence over the phrases of a domain: clauses joined by "and" or "or", names joined in a slot, places that restrict.
+//! A sentence over the phrases of a domain: clauses joined by "and" or "or", names joined in a slot, and
+//! places that restrict the objects meant.
 
 use std::collections::BTreeSet;
 use std::rc::Rc;
@@ -15,7 +16,7 @@ use crate::objective::Filled;
 use crate::slots::type_of_slot;
 use crate::symbol::symbol;
 
-/// Words of a name at most; more are a clause.
+/// Maximum number of words of a name; more are a clause.
 pub(super) const NAME_WORDS: usize = 4;
 
 /// Conjunction that joins clauses.
@@ -25,7 +26,7 @@ pub(super) enum Joint {
     Or,
 }
 
-/// Phrase with its slot values and place restriction.
+/// Phrase with its slot values and place restrictions.
 #[derive(Debug, Clone)]
 pub(super) struct Clause<'a> {
     pub(super) phrase: &'a GoalPhrase,
@@ -41,7 +42,7 @@ pub(super) struct Restriction {
     symbol: String,
 }
 
-/// Clauses and their conjunction.
+/// Clauses joined by one conjunction.
 #[derive(Debug, Clone)]
 pub(super) struct Sentence<'a> {
     pub(super) joint: Joint,
@@ -63,7 +64,7 @@ struct Noun {
     within: Option<Restriction>,
 }
 
-/// Words between clauses or names.
+/// Conjunction between clauses or names; `Some(None)` for a comma, `None` for any other word.
 fn joint(word: &str) -> Option<Option<Joint>> {
     match word {
         "and" => Some(Some(Joint::And)),
@@ -77,13 +78,13 @@ fn joint(word: &str) -> Option<Option<Joint>> {
 pub(super) struct Reader<'a> {
     pub(super) domain: &'a Domain,
     pub(super) lexicon: &'a Lexicon,
-    /// Slots of phrases that fit otherwise.
+    /// Slot contents that are no known names, in phrases that fit otherwise.
     pub(super) misses: Vec<Miss>,
     /// True if "and" and "or" were found side by side.
     pub(super) is_mixed: bool,
-    /// Every form of every phrase, in plain words.
+    /// All forms of all phrases, in plain words.
     forms: Rc<Vec<(&'a GoalPhrase, Vec<String>)>>,
-    /// Suffixes of the sentence that are known not to match.
+    /// Parts of the sentence that are known not to match.
     dead: BTreeSet<String>,
 }
 
@@ -99,7 +100,7 @@ impl<'a> Reader<'a> {
         Self { domain, lexicon, misses, is_mixed: false, forms: Rc::new(forms), dead }
     }
 
-    /// A phrase word for word.
+    /// Matches words with one phrase, word for word.
     pub(super) fn literal(&mut self, words: &[String]) -> Option<Sentence<'a>> {
         let said = self.domain.config.goal.iter().flat_map(|p| p.ways().map(move |say| (p, say)));
         for (phrase, say) in said {
@@ -112,7 +113,7 @@ impl<'a> Reader<'a> {
         None
     }
 
-    /// A sentence in plain words.
+    /// Matches plain words with one phrase, or with several joined by conjunctions.
     pub(super) fn sentence(&mut self, words: &[String]) -> Option<Sentence<'a>> {
         let text = words.join(" ");
         if self.dead.contains(&text) {
@@ -154,8 +155,8 @@ impl<'a> Reader<'a> {
         Some(Sentence { joint, clauses: head.clauses.into_iter().chain(tail.clauses).collect() })
     }
 
-    /// Matches one phrase, of whose slots one may hold several names. The domain's own words take
-    /// precedence over synonyms.
+    /// Matches words with one phrase, of which one slot may hold several names. The domain's own words
+    /// take precedence over synonyms.
     fn clause(&mut self, words: &[String]) -> Option<Sentence<'a>> {
         self.clause_in(words, |own, said| own == said).or_else(|| self.clause_in(words, english::is_same))
     }
@@ -175,7 +176,8 @@ impl<'a> Reader<'a> {
         None
     }
 
-    /// Phrase with one name per slot.
+    /// Clause of a phrase with one name per slot; `None` if a slot holds no known name, which is noted
+    /// in `misses`.
     fn filled(&mut self, phrase: &'a GoalPhrase, slots: &[(&str, String)]) -> Option<Clause<'a>> {
         let mut filled = Vec::new();
         for (slot, found) in slots {
@@ -194,7 +196,7 @@ impl<'a> Reader<'a> {
         Some(Clause { phrase, slots: filled, within: Vec::new() })
     }
 
-    /// Phrase with several names, or names with a place, in one slot.
+    /// Clauses of a phrase in which one slot holds several names, or a name with a place.
     fn several(&mut self, phrase: &'a GoalPhrase, slots: &[(&str, String)]) -> Option<Sentence<'a>> {
         let mut lists = Vec::new();
         for (slot, found) in slots {
@@ -249,7 +251,7 @@ impl<'a> Reader<'a> {
         Some((first, nouns))
     }
 
-    /// Name followed by its place.
+    /// Known name, alone or followed by its place.
     fn noun(&self, of_type: &str, words: &[String]) -> Option<Noun> {
         self.called(of_type, words).or_else(|| {
             (1..words.len().saturating_sub(1)).find_map(|at| {
@@ -305,7 +307,7 @@ impl<'a> Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// A colour before the name of an object or a kind that looks tell: "red cup".
+    /// Colour before the name of an object or a kind that has models: "red cup".
     fn coloured(&self, of_type: &str, words: &[String]) -> Option<Noun> {
         let (first, rest) = english::without_determiners(words).split_first()?;
         let colour = basic(&first.to_lowercase()).filter(|_| ["thing", "kind"].contains(&of_type))?;
@@ -342,8 +344,9 @@ fn resolved(words: &[String], before: &Sentence<'_>) -> Vec<String> {
     words.iter().flat_map(of).collect()
 }
 
-/// Meaning restricted to some places: every object quantified over is such a place, or related to
-/// one by the domain's word for the preposition; `None` if the meaning has no such object.
+/// Goal condition restricted to some places: the first object quantified over is such a place, or is
+/// related to one by the domain's predicate for the preposition. `None` if the condition has no such
+/// object.
 pub(super) fn restricted(means: &str, within: &[Restriction], domain: &Domain) -> Option<String> {
     within.iter().try_fold(means.to_string(), |means, place| {
         let (before, behind) = means.split_once("(exists (?")?;
@@ -364,7 +367,7 @@ pub(super) fn restricted(means: &str, within: &[Restriction], domain: &Domain) -
     })
 }
 
-/// Position of the bracket that closes the one before a text.
+/// Byte position of the bracket that closes the one opened just before a text.
 fn closing(text: &str) -> Option<usize> {
     let mut open = 1;
     text.char_indices().find_map(|(at, c)| {

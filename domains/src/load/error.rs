@@ -10,17 +10,17 @@ pub enum LoadError {
         "there is no domain \"{name}\"{near}\n  expected a folder that holds domain.pddl and domain.toml, or a built-in domain: {known}"
     )]
     NoDomain {
-        /// The requested domain.
+        /// Name of the requested domain.
         name: String,
-        /// The built-in domains.
+        /// Names of the built-in domains.
         known: String,
-        /// A question about the nearest of them, or nothing.
+        /// Question whether the nearest built-in domain is meant; empty if none is near.
         near: String,
     },
     /// Unreadable file.
     #[error("{path}: {because}\n  expected: {expected}")]
     File {
-        /// The file.
+        /// Path of the file.
         path: String,
         /// Error of the operating system.
         because: String,

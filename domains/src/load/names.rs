@@ -9,7 +9,7 @@ use crate::load::error::LoadError;
 use crate::symbol::symbol;
 use crate::toml_place::TomlPlaces;
 
-/// Object file and its parsed model.
+/// Object file (name for errors, and text) and its parsed model.
 pub(super) type Read<'a> = (&'a (String, String), ObjectModel);
 
 /// Checks the objects of a folder: every name can be spoken and is unambiguous, and every body has
@@ -71,7 +71,7 @@ fn names(object: &ObjectModel) -> impl Iterator<Item = (Vec<String>, &String)> {
     std::iter::once((vec!["name".to_string()], &object.name)).chain(phrases)
 }
 
-/// Fault of a name that means another object.
+/// Fault of a name that already means another object.
 fn another(others: &[Read<'_>], name: &str) -> Option<(String, String)> {
     let is_called = |(_, other): &&Read<'_>| names(other).any(|(_, called)| symbol(called) == symbol(name));
     let (file, other) = others.iter().find(is_called)?;

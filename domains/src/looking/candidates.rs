@@ -13,7 +13,7 @@ use crate::viewpoint::Candidate;
 /// Radial offsets tried for a ring pose until the footprint fits, metres.
 const OUTWARDS_M: [f64; 7] = [0.0, 0.1, 0.2, -0.1, 0.3, -0.2, 0.4];
 
-/// Viewpoints, and the one at which the body stands.
+/// Viewpoints, and the index of the one at which the body stands.
 pub fn candidates(
     robot: &dyn Robot,
     own_map: &dyn OwnMap,
@@ -62,7 +62,8 @@ fn station_symbol(name: &str) -> String {
     if is_number { symbol(&format!("station {name}")) } else { symbol(name) }
 }
 
-/// Poses around a point that face it, numbered from 1; a pose is dropped if no offset fits.
+/// Poses around a point that face it, numbered from 1; a pose is dropped if it is unreachable at every
+/// offset of [`OUTWARDS_M`].
 pub(crate) fn ring(
     robot: &dyn Robot,
     own_map: &dyn OwnMap,

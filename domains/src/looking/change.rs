@@ -7,9 +7,9 @@ use serde::Serialize;
 /// Place where an object has moved: an upright cylinder.
 #[derive(Debug, Clone, Serialize)]
 pub struct Change {
-    /// Time before which observations of the place are invalid.
+    /// Time before which observations of the place are invalid, nanoseconds.
     pub stamp_ns: i64,
-    /// Centre of the foot in the map.
+    /// Centre of the foot, map frame.
     pub foot: Point3<f64>,
     /// Axis of the cylinder, a unit vector.
     pub up: Vector3<f64>,
@@ -20,7 +20,7 @@ pub struct Change {
 }
 
 impl Change {
-    /// Removes the returns of a view on the place and through it, as if there were no return.
+    /// Blanks the returns of a view whose rays cross the place.
     pub fn blank(&self, view: &mut View) {
         let eye = Point3::from(view.world_from_camera.translation.vector);
         for p in view.cloud.points.iter_mut().filter(|p| p.x.is_finite()) {
@@ -30,7 +30,7 @@ impl Change {
         }
     }
 
-    /// True if a straight line crosses the cylinder.
+    /// True if a straight line between two points crosses the cylinder.
     pub fn is_crossed(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         let split = |v: Vector3<f64>| (v.dot(&self.up), v - self.up * v.dot(&self.up));
         let (low, aside) = split(from - self.foot);

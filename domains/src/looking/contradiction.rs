@@ -1,18 +1,18 @@
-//! Contradictions between looks and the map.
+//! Contradictions between views and the map.
 
 use descry_perception::consistency::Fault;
 
-/// Reason why the looks at a surface prove nothing.
+/// Reason why the views of a surface prove nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Contradiction {
-    /// A fault of camera or poses.
+    /// Fault of the camera or of the poses.
     Fault(Fault),
-    /// The views inconsistent with their stated poses are as many as the consistent ones.
+    /// As many views are inconsistent with their stated poses as are consistent.
     Apart,
 }
 
 impl Contradiction {
-    /// The contradiction in a sentence, with the surface by name.
+    /// Sentence on the contradiction, with the surface by name.
     pub fn told(&self, surface: &str) -> String {
         match self {
             Contradiction::Fault(fault) => {

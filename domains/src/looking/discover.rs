@@ -1,8 +1,8 @@
-//! Surfaces outside the map: associates the visible ones with the surface that was looked at and
-//! with others.
+//! Surfaces outside the map: associates the visible ones with the surface that was viewed and with
+//! others.
 //!
-//! Without a map a look shows whatever stands in front of the camera. Each surface to stand things on is one of its own, with its
-//! own views, belief and space: what is asked for may be on any of them.
+//! Without a map, a view shows whatever stands in front of the camera. Each supporting surface in view
+//! gets its own views, belief and observed space: the requested object may be on any of them.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::symbol::symbol;
 
 /// Minimum area of an additional surface, square metres.
 const LEAST_M2: f64 = 0.1;
-/// Height difference below which two surfaces are level, metres.
+/// Maximum height difference between two parts of one surface, metres.
 const LEVEL_M: f64 = 0.08;
 /// Margin around an outline within which the centre of another part of the same surface may lie,
 /// metres.
@@ -26,8 +26,8 @@ const BESIDE_M: f64 = 0.05;
 const ORDINALS: [&str; 9] =
     ["second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth"];
 
-/// Surface that was looked at, and the other supporting surfaces in view. An unknown one becomes
-/// the best surface that is not known as another.
+/// Surface that was viewed, and the other supporting surfaces in view. If the viewed one has no outline
+/// yet, the best surface that is not known as another is taken for it.
 pub(super) fn look(
     merged: &Merged,
     options: &SurfaceOptions,
@@ -46,7 +46,7 @@ pub(super) fn look(
     Ok((surface, others))
 }
 
-/// Adds surfaces found beside the one looked at, with their views; returns the new ones.
+/// Adds surfaces found beside the viewed one, with its views; returns the indices of the new ones.
 pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mut Vec<Note>) -> Vec<usize> {
     let fresh = |s: &Surface, mind: &Mind| !mind.known.surfaces.iter().any(|known| is_one(s, known));
     let mut new = Vec::new();
@@ -94,8 +94,8 @@ pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mu
     new
 }
 
-/// Joins two discovered surfaces that turn out to be one: the later is dropped, and its objects are
-/// sought on the other.
+/// Joins two discovered surfaces that turn out to be one: the later is dropped, and its objects move to
+/// the other.
 pub(super) fn join(mind: &mut Mind, on: usize, surface: &Surface) {
     let known = &mind.known.surfaces;
     let Some(last) = (on + 1..known.len()).rev().find(|&n| !known[n].whole && is_one(surface, &known[n]))

@@ -1,4 +1,4 @@
-//! Ranking of looks by settled doubt.
+//! Ranking of looks by the doubt that they would settle.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -9,10 +9,11 @@ use crate::ability::{Deed, OBSERVE, best_first};
 use crate::belief::doubt::{Doubt, Taken};
 use crate::situation::{Situation, cells};
 
-/// Duration of a look, seconds, as in the domain.
+/// Assumed duration of a view, seconds, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
-/// Useful looks that fit into the remaining time, by settled doubt per second, best first.
+/// Useful looks (candidate, surface) that fit into the remaining time, by settled doubt per second, best
+/// first.
 pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     // Where all of a kind are wanted, what else is in doubt of each of them is not asked about.
     let is_open = |&of: &usize| s.completeness(of) < s.wanted_of(of);
@@ -32,12 +33,12 @@ pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     best_first(worth.map(|(look, settles)| (settles / takes_s(look.0), look)).collect())
 }
 
-/// Useful looks as deeds, best first.
+/// Useful looks as sequences of drive and view, best first.
 pub(crate) fn look_deeds(s: &Situation) -> Vec<Vec<Deed>> {
     looks(s).into_iter().map(|(from, on)| look(s, from, on).after_drive(s, from)).collect()
 }
 
-/// A look from a candidate at a surface.
+/// Skill that views a surface from a candidate.
 pub(crate) fn look(s: &Situation, from: usize, on: usize) -> Deed {
     Deed::new(OBSERVE, [s.candidates[from].symbol.as_str(), s.surfaces[on].symbol.as_str()])
 }
@@ -51,8 +52,8 @@ pub fn one_then(mut first: Plan, second: Plan) -> Plan {
 }
 
 impl Situation {
-    /// Time for going to a surface and looking, without doors, seconds; from the place of the last
-    /// look, so that the value stays constant while the body moves.
+    /// Time to drive to a surface and view it, as if all doors were open, seconds. The drive starts at
+    /// the place of the last view, so that the value stays constant while the body moves.
     pub fn going_there_s(&self, on: usize) -> f64 {
         let kept: &GoingThere = self.derived.get(&|| GoingThere(cells(self.surfaces.len())));
         *kept.0[on].get_or_init(|| {
@@ -67,5 +68,5 @@ impl Situation {
     }
 }
 
-/// Time to go to each surface, seconds.
+/// Cache of the times to go to each surface and view it, seconds.
 struct GoingThere(Vec<OnceLock<f64>>);

@@ -1,4 +1,4 @@
-//! Looking: viewpoints, and the update of belief from views.
+//! Viewpoints, and the update of the belief from views.
 
 pub mod candidates;
 pub mod change;

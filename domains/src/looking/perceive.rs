@@ -133,8 +133,8 @@ fn made_out(
     found.map(|(surface, others)| (merged, surface, others)).map_err(|nothing| nothing.to_string())
 }
 
-/// Handles objects moved while unobserved: only the newest view of the surface stays valid, and
-/// looks may be repeated.
+/// Handles objects moved while unobserved: only the newest view of the surface stays valid, and views
+/// from its other viewpoints may be repeated.
 fn begin_again(mind: &mut Mind, on: usize) {
     let region = &mut mind.regions[on];
     let last = region.looks.len().saturating_sub(1);
@@ -147,8 +147,8 @@ fn begin_again(mind: &mut Mind, on: usize) {
     mind.attend();
 }
 
-/// Aligns each new view of a mapped surface with its outline individually. Views of a long surface
-/// from its two ends share little; the edges in each hold them.
+/// Aligns each new view of a mapped surface with the surface's outline individually. Views of a long
+/// surface from its two ends share little; the edges in each view locate it.
 fn place_looks(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -168,8 +168,8 @@ fn place_looks(
     Ok(())
 }
 
-/// Drops views in which the surface could not be found, if taken from much farther away than one in
-/// which it was: they blur the others. False if the newest is dropped.
+/// Drops views in which the surface was not found, if their depth noise is much larger than that of the
+/// best view in which it was found: they blur the others. False if the newest view is dropped.
 fn keep_placed(looks: &mut Vec<RecordedView>) -> bool {
     let newest = looks.last().map(|look| look.stamp_ns);
     let sigma_m = |look: &RecordedView| axial_sigma_m(look.away_m, 0.0).unwrap_or_default();
@@ -183,11 +183,11 @@ fn keep_placed(looks: &mut Vec<RecordedView>) -> bool {
 /// Margin around a surface within which the centre of an object on it must lie, metres; an object
 /// farther out stands beside the surface.
 const OVER_M: f64 = 0.06;
-/// Ratio of noise above which a view blurs a better one.
+/// Ratio of depth noise above which a view blurs a better one.
 const BLURRED: f64 = 2.0;
 
-/// Drops each view of a mapped surface that outline and other views moved beyond the localisation
-/// error, as it slid along them. False if nothing was dropped, or nothing would remain.
+/// Drops each view of a mapped surface that alignment with outline and other views moved beyond the
+/// localisation error. False if nothing was dropped, or nothing would remain.
 fn without_astray(
     mind: &mut Mind,
     body: &Description,
@@ -236,8 +236,8 @@ fn restore(mind: &Mind, eyes: Eyes<'_>, on: usize) -> Result<Vec<View>, WorldErr
     region.looks.iter().map(restored).collect()
 }
 
-/// Handles a moved object: invalidates observations in the cylinder around it, and allows repeated
-/// looks.
+/// Handles a moved object: invalidates observations in the cylinder around it, and allows views of the
+/// surface to be repeated.
 pub fn something_moved(
     mind: &mut Mind,
     record: &Record,
@@ -254,7 +254,7 @@ pub fn something_moved(
     Ok(())
 }
 
-/// Handles a finished push, with the distance that the obstacle moved.
+/// Handles a finished push, with the distance in metres that the obstacle moved.
 pub fn pushed(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -382,7 +382,7 @@ fn confidences(mind: &Mind, eyes: Eyes<'_>) -> Vec<f64> {
     (0..now.things.len()).map(|what| now.confidence(what)).collect()
 }
 
-/// A percept in a line.
+/// Percept as one line of text.
 pub fn in_a_line(p: &Percept) -> String {
     let name = p.label.as_deref().unwrap_or("unknown");
     let probability = p.label.as_deref().map_or(p.unknown, |label| p.probability_of(label));
@@ -435,7 +435,7 @@ fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
     DepthMap::from_view(view, &fit.world_from_camera)
 }
 
-/// Names and probabilities under which percepts are recorded as sightings.
+/// Labelled percepts as recorded sightings, with their probabilities.
 fn sightings(percepts: &[Percept]) -> Vec<Sighting> {
     let of = |p: &Percept| p.label.clone().map(|label| (p.probability_of(&label), label));
     let named = percepts.iter().filter_map(of);
@@ -449,7 +449,7 @@ fn footprint(p: &Percept, up: &Vector3<f64>, merged: &Merged) -> Vec<Point3<f64>
     Hull::around(below, points).map_or_else(Vec::new, |hull| hull.corners_in_space())
 }
 
-/// Cameras that saw an object, that is, measured the facing side of its body.
+/// Positions of the cameras that saw an object, that is, measured the facing side of its body.
 fn seen_from(p: &Percept, up: &Vector3<f64>, visibility: &Visibility) -> Vec<Point3<f64>> {
     let middle = p.position_m + up * (p.size_m[2] / 2.0);
     let radius = p.size_m[0].min(p.size_m[1]) / 2.0;

@@ -12,8 +12,8 @@ use crate::looking::merging::options_at;
 use crate::mind::Laid;
 use crate::surface::KnownSurface;
 
-/// Aligns a merged surface with the map's outline, correcting the remaining localisation error;
-/// returns the certainty.
+/// Aligns a merged surface with the map's outline, correcting the remaining localisation error. The
+/// certainty of the alignment is `None` for an unmapped surface.
 pub(super) fn lay_on_map(
     body: &Description,
     known: &KnownSurface,
@@ -28,7 +28,8 @@ pub(super) fn lay_on_map(
     (merged.moved(&map_from_world), surface.moved(&map_from_world), located.certainty)
 }
 
-/// Alignment of a view with a mapped surface's outline; `Nowhere` if beyond the localisation error.
+/// Alignment of a view with a mapped surface's outline; `Nowhere` if the surface is not found, or only
+/// beyond the localisation error.
 pub(super) fn of_view(
     body: &Description,
     known: &KnownSurface,

@@ -8,7 +8,7 @@ use crate::error::WorldError;
 use crate::eyes::Eyes;
 use crate::mind::{Laid, Mind, RecordedView};
 
-/// Records a view of some surfaces, with transforms, colours and cloud atomically; durable on
+/// Records a view of some surfaces (indices), with transforms, colours and cloud atomically; durable on
 /// return.
 pub fn view(
     mind: &mut Mind,
@@ -71,7 +71,7 @@ fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), World
     Ok(record.put_image_soon(sensed.stamp_ns, frame, image, meta)?)
 }
 
-/// Bounds in the map of a frame's points; `None` without returns.
+/// Bounds of a frame's points, map frame; `None` without returns.
 fn extent(sensed: &Sensed) -> Option<Bounds> {
     let points =
         sensed.cloud.points.iter().map(|p| p.cast::<f64>()).filter(|p| p.iter().all(|x| x.is_finite()));

@@ -31,7 +31,8 @@ pub(super) fn taken_away(mind: &Mind, on: usize, gone_before: usize, newest: &De
     })
 }
 
-/// Sets aside remembered objects of earlier runs at places that no view has seen yet.
+/// Takes remembered objects of earlier runs out of the belief where no view has seen their places yet;
+/// returns them.
 pub(super) fn set_aside_unseen(
     belief: &mut Belief,
     surface: &KnownSurface,

@@ -54,7 +54,7 @@ impl World<'_> {
         (*times > limits.repeats).then(|| Ended::Failed(why()))
     }
 
-    /// Persistent belief after this run, if any.
+    /// Persistent belief after this run; `None` if the run keeps none.
     pub fn to_remember(&self) -> Option<Remembered> {
         let known = &self.mind.known;
         let past = known.past.as_ref()?;

@@ -13,11 +13,12 @@ use crate::situation::Situation;
 use crate::{abilities, actions, culprit, origin, words};
 
 impl World<'_> {
-    /// Certainly useful step after the planner has hit its state limit, or else a look behind a
-    /// shut door.
+    /// Choice after the planner has hit its state limit: a certainly useful step, or else a look behind
+    /// a shut door.
     ///
     /// # Errors
-    /// [`WorldError::Domain`] if the domain has no word for being at a pose.
+    ///
+    /// None at present.
     pub fn fallback(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
@@ -31,13 +32,13 @@ impl World<'_> {
         }
     }
 
-    /// The fallback of the first ability that has its own.
+    /// Fallback plans of the first used ability that has its own; `None` if none has.
     fn own_fallback(&self, s: &Situation) -> Option<Vec<Vec<Deed>>> {
         let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
         own.map(|fallback| fallback(s))
     }
 
-    /// Look behind a shut door.
+    /// Choice of a look behind a shut door; [`Choice::Nothing`] if there is none.
     fn behind(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         loop {
@@ -64,12 +65,13 @@ impl World<'_> {
         judge.map(|judge| judge.goal())
     }
 
-    /// True if looks may decide the goal.
+    /// True if views may decide the goal.
     fn is_open_to_looks(&self, round: &Round) -> bool {
         self.judgement(round).is_some_and(|judged| judged.is_open_to_looks())
     }
 
-    /// True if the goal is a question that depends on a word of which neither looks nor other sensing actions tell.
+    /// True if the goal is a question that depends on a fact which neither views nor other sensing
+    /// actions can tell.
     pub(super) fn is_beyond_looks(&self, round: &Round) -> bool {
         let of_no_look = |judged: Judgement| {
             let is_open = judged.value == Truth::Unknown;
@@ -78,13 +80,14 @@ impl World<'_> {
         self.setting.goal.question && self.judgement(round).is_some_and(of_no_look)
     }
 
-    /// True if a sensing action can still tell the value of a word that a program states.
+    /// True if a sensing action can still tell the value of a fact that a program states.
     fn is_revealed(&self, word: &Decisive) -> bool {
         let domain = self.setting.domain;
         domain.vocabulary.word(&word.word).is_some_and(|word| origin::is_revealed(domain, &word))
     }
 
-    /// Plan for the sensing actions that reveal the word that leaves the goal open; none if no such action is left to try.
+    /// Choice of a plan for the sensing actions that reveal the fact which leaves the goal open; `None`
+    /// if no such action is left to try.
     fn reveals(&mut self, round: &Round) -> Option<Choice> {
         let judged = self.judgement(round).filter(|judged| judged.value == Truth::Unknown)?;
         let word = judged.word.filter(|word| !word.is_number && self.is_revealed(word))?;
@@ -99,11 +102,13 @@ impl World<'_> {
         Some(Choice::Towards { task: Box::new(task), then: Plan::default() })
     }
 
-    /// Look to take before accepting a goal that holds by absence of evidence: the one that settles
-    /// most of the contrary evidence, or else one behind a shut door, while the answer is unknown.
+    /// Choice of a look to take before accepting a goal that holds by absence of evidence: the one that
+    /// settles most of the contrary evidence, or else one behind a shut door, while the answer is
+    /// unknown.
     ///
     /// # Errors
-    /// [`WorldError::Domain`] if the domain has no word for being at a pose.
+    ///
+    /// None at present.
     pub fn before_denying(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
@@ -120,11 +125,12 @@ impl World<'_> {
         }
     }
 
-    /// Look that may still help without a plan, if time is too short or no look promises the goal:
-    /// the one with the highest gain per second that ends in time.
+    /// Choice of a look that may still help without a plan, if time is too short or no look promises the
+    /// goal: the one with the highest gain per second that ends in time.
     ///
     /// # Errors
-    /// Never: it is chosen as [`World::fallback`] is.
+    ///
+    /// None at present.
     pub fn in_time(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);

@@ -20,10 +20,10 @@ const MOST_VIEWPOINTS: [usize; 2] = [64, 160];
 /// Share of the doubt settleable by a surface's looks that its viewpoints of the second stage
 /// cover.
 const COVERED: f64 = 0.98;
-/// Words about viewpoints that do not by themselves make a viewpoint relevant.
+/// Predicates whose facts do not by themselves make a viewpoint relevant.
 const OF_ANY: [&str; 4] = ["at", "observed", "out-of-reach", "beside"];
 
-/// A task with some of the viewpoints.
+/// Task restricted to some of the viewpoints.
 pub struct Focus<'t> {
     /// The task.
     pub task: Cow<'t, Task>,

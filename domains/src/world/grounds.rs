@@ -82,7 +82,7 @@ pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[KnownSurfac
     belief
 }
 
-/// Surfaces named directly or by their rooms.
+/// Indices of the surfaces named directly or by their rooms.
 fn places_of(
     places: &[String],
     rooms: &[Named],
@@ -148,7 +148,8 @@ pub(super) fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Checks that surfaces named by the domain are on the map, if that has surfaces.
+/// Checks that the surfaces named by the domain are known to the body, and that a body without a map has
+/// one surface only.
 pub(super) fn known_by_map(domain: &Domain, surfaces: &[KnownSurface]) -> Result<(), WorldError> {
     if let [first, second, ..] = surfaces
         && surfaces.iter().all(|s| !s.whole)

@@ -1,4 +1,4 @@
-//! Steps chosen without the planner: the domain's own actions that carry out a deed, where their
+//! Steps chosen without the planner: the domain's own actions that carry out a skill, where their
 //! conditions hold.
 
 use descry_planner::semantics::Binding;
@@ -13,7 +13,7 @@ use crate::round::Round;
 
 /// Gap between consecutive steps, seconds.
 const GAP_S: f64 = 0.001;
-/// Maximum number of tried bindings of parameters that the deed leaves open.
+/// Maximum number of tried bindings of parameters that the skill's arguments leave open.
 const BINDINGS: usize = 64;
 
 impl World<'_> {
@@ -39,13 +39,14 @@ impl World<'_> {
         choice
     }
 
-    /// First of several alternatives that can be done at once.
+    /// First of several alternatives that can be carried out at once; `None` if none can.
     pub(super) fn first_of(&self, round: &Round, all: &[Vec<Deed>]) -> Option<Choice> {
         all.iter().find_map(|deeds| self.directly(round, deeds, false)).map(Choice::Steps)
     }
 
-    /// Deeds as consecutive steps of the domain's actions whose conditions hold; `None` if there
-    /// are no such actions. `is_unadvised`: ignores calls that advise on usefulness.
+    /// Plan of consecutive steps that carry out the skills by the domain's actions, where their
+    /// conditions hold; `None` if there are no such actions. `is_unadvised`: ignores calls that advise
+    /// on usefulness.
     pub(super) fn directly(&self, round: &Round, deeds: &[Deed], is_unadvised: bool) -> Option<Plan> {
         let freed = is_unadvised.then(|| self.without_advice(&round.task));
         let task = freed.as_ref().unwrap_or(&round.task);
@@ -87,7 +88,8 @@ impl World<'_> {
         plans.into_iter().next()
     }
 
-    /// Plan towards the place of the last deed's first applicable action, with that action.
+    /// Choice of a plan towards the start of the first action that carries out the last skill, and then
+    /// that action.
     pub(super) fn towards(&self, round: &Round, deeds: &[Deed], is_unadvised: bool) -> Option<Choice> {
         let freed = is_unadvised.then(|| self.without_advice(&round.task));
         let mut task = freed.unwrap_or_else(|| round.task.clone());
@@ -105,7 +107,7 @@ impl World<'_> {
         Some(Choice::Towards { task: Box::new(task), then: Plan { steps: vec![step], ..Plan::default() } })
     }
 
-    /// Actions that carry out a deed with all their arguments; those that do nothing else first.
+    /// Actions, with all their arguments, that carry out a skill; those that do nothing else first.
     fn calls(&self, task: &Task, deed: &Deed) -> Vec<(String, Vec<String>)> {
         let known = |action: &Performer| task.actions.iter().find(|a| a.name == action.action);
         let performers = actions::performers(self.setting.domain, deed);
@@ -132,7 +134,7 @@ impl World<'_> {
     }
 }
 
-/// A condition without the calls of some modules.
+/// Condition without the calls of some modules.
 fn without(own: Condition, is_gone: &dyn Fn(descry_planner::task::ModuleId) -> bool) -> Condition {
     match own {
         Condition::And(parts) => {
@@ -153,7 +155,7 @@ fn startable(action: &Action, binding: &Binding) -> Scoped<Condition> {
     Scoped { slots: action.slots, body }
 }
 
-/// Argument bindings of an action; parameters left open by the deed take any fitting object.
+/// Argument bindings of an action; parameters that the skill leaves open take any fitting object.
 fn bindings(task: &Task, action: &Action, performer: &Performer) -> Vec<(String, Vec<String>)> {
     let mut all: Vec<Vec<String>> = vec![Vec::new()];
     for (parameter, given) in action.parameters.iter().zip(&performer.arguments) {

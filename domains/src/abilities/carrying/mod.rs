@@ -27,9 +27,9 @@ const TOUCHED_M: f64 = 0.03;
 /// Radius around the original place within which an object that slipped out of the hand may lie,
 /// metres.
 const SLIPPED_M: f64 = 0.15;
-/// Localisation margin in standard deviations; the next constant is the distance of looks at
-/// objects, metres.
+/// Number of standard deviations of localisation that are allowed for as error.
 const ASTRAY: f64 = 2.0;
+/// Assumed distance between the body and an object that it looks at, metres.
 const FROM_M: f64 = 1.2;
 
 /// Skill that puts down the held object.
@@ -123,14 +123,14 @@ fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     quickest_first(free.map(|spot| (s.travel_s(s.at, spot.0), deed(spot))).collect())
 }
 
-/// `(holding ?thing)`.
+/// States `(holding ?thing)` for every thing that the object in the hand is taken for.
 fn holding(s: &Situation) -> Vec<String> {
     let Some(track) = held(s) else { return Vec::new() };
     let held = s.things.iter().filter(|thing| is_held(s, thing, track));
     held.map(|thing| format!("(holding {})", thing.symbol)).collect()
 }
 
-/// Bounds on `(holding ?thing)`: what is in the hand was seen.
+/// Bounds on `(holding ?thing)`: exactly 1 or 0, since the object in the hand is always a known one.
 fn is_in_hand(s: &Situation, of: &[Referent<'_>]) -> Range {
     let is_it = |track: &Track| match of {
         [Referent::Named(name)] => s.things.iter().any(|t| t.symbol == **name && is_held(s, t, track)),
@@ -140,7 +140,8 @@ fn is_in_hand(s: &Situation, of: &[Referent<'_>]) -> Range {
     Range::exactly(f64::from(u8::from(held(s).is_some_and(is_it))))
 }
 
-/// True if the object in the hand is the thing.
+/// True if the object in the hand is the thing: by identity if the thing is a seen object, else by
+/// probability.
 fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
     match thing.track {
         Some(id) => id == track.id,
@@ -148,24 +149,24 @@ fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
     }
 }
 
-/// Name of a thing.
+/// Name of the thing with a symbol; the symbol itself if there is no such thing.
 fn thing_name<'a>(s: &'a Situation, symbol: &'a str) -> &'a str {
     s.thing(symbol).map_or(symbol, |n| &s.things[n].name)
 }
 
-/// `(hand-free)`: also true of a body without a hand, which can still look; `[can-grasp]` excludes
-/// picking up.
+/// States `(hand-free)` while nothing is held, also for a body without a hand, which can still look;
+/// `[can-grasp]` excludes picking up.
 fn hand_free(s: &Situation) -> Vec<String> {
     if s.held.is_none() { vec!["(hand-free)".into()] } else { Vec::new() }
 }
 
-/// Object in the hand.
+/// Object in the hand; `None` if the hand is empty.
 fn held(s: &Situation) -> Option<&Track> {
     let held = s.held.as_ref()?;
     s.belief.tracks.iter().find(|t| t.id == held.track)
 }
 
-/// Object on a surface that is most likely the thing.
+/// Object on a surface that is most likely the thing; `None` if none reaches the confidence threshold.
 fn standing<'a>(s: &'a Situation, thing: &str, surface: &str) -> Option<&'a Track> {
     let thing = &s.things[s.thing(thing).ok()?];
     let there = s.belief.tracks.iter().filter(|t| t.on == surface);
@@ -174,26 +175,26 @@ fn standing<'a>(s: &'a Situation, thing: &str, surface: &str) -> Option<&'a Trac
     there.max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) >= s.threshold)
 }
 
-/// Middle of an object's body.
+/// Centre of an object's body, half its height above its foot point; map frame.
 fn middle(s: &Situation, track: &Track) -> Point3<f64> {
     let up = s.surface_of(track).map_or_else(Vector3::z, |on| s.surfaces[on].up);
     track.position_m + up * (0.5 * track.size_m[2])
 }
 
-/// Horizontal distance of a point from the body at a candidate, metres; `None` with a wall in
-/// between.
+/// Horizontal distance of a point from the body at a candidate, metres; `None` with a wall in between or
+/// at a station.
 fn distance_m(s: &Situation, from: usize, p: &Point3<f64>) -> Option<f64> {
     let Place::Pose(base) = &s.candidates[from].place else { return None };
     (!s.is_walled_off(&base.point(), &p.xy())).then(|| (p.xy() - base.point()).norm())
 }
 
-/// Localisation error to allow for at an object that is looked at, metres.
+/// Localisation error to allow for at an object seen from [`FROM_M`], metres.
 fn astray_m(body: &Description) -> f64 {
     ASTRAY * (body.pose_sigma_m + body.pose_sigma_rad * FROM_M)
 }
 
-/// True if the hand reaches a point from a candidate, past every wall and at any allowed
-/// localisation error; if no candidate is near enough for that, the nearest one counts.
+/// True if the hand reaches a point from a candidate with no wall in between and with a margin for
+/// localisation error. The candidate nearest to the point needs no margin.
 fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
     let body = s.robot.description();
     let Some((d_m, reach_m)) = distance_m(s, from, p).zip(body.reach_m()) else { return false };
@@ -204,7 +205,8 @@ fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
     d_m <= reach_m && (d_m + astray_m(body) <= reach_m || is_nearest())
 }
 
-/// `[can-grasp ?from ?what ?on]`: an object not found yet may stand anywhere on the surface.
+/// Answers `[can-grasp ?from ?what ?on]`; an object not found yet is assumed to be at the centre of the
+/// surface.
 fn can_grasp(s: &Situation, call: &Call) -> Result<descry_planner::Answer, CallError> {
     let from = s.candidate(argument(call, 0)?)?;
     let body = s.robot.description();
@@ -222,13 +224,14 @@ fn can_grasp(s: &Situation, call: &Call) -> Result<descry_planner::Answer, CallE
     Ok(descry_planner::Answer::Truth(can))
 }
 
-/// `[can-put ?from ?on]`.
+/// Answers `[can-put ?from ?on]`; space that was not observed counts as free.
 fn can_put(s: &Situation, call: &Call) -> Result<descry_planner::Answer, CallError> {
     let (from, on) = (s.candidate(argument(call, 0)?)?, s.surface(argument(call, 1)?)?);
     Ok(descry_planner::Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some()))
 }
 
-/// Position at which the held object is put down.
+/// Position at which the held object is put down, map frame; an error if no observed free space is
+/// within reach.
 fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let on = s.surface(arguments[2]).map_err(|e| e.to_string())?;
@@ -237,7 +240,8 @@ fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
         .ok_or_else(|| format!("there is no free place within reach on {}", arguments[2]))
 }
 
-/// Invalidates the observed space around an object's place.
+/// Invalidates the observed space around an object's place, up to `more_m` metres and the localisation
+/// error beyond the object.
 fn void(mind: &mut Mind, eyes: Eyes<'_>, track: &Track, more_m: f64) -> Result<(), WorldError> {
     let Some(on) = mind.known.surfaces.iter().position(|k| k.symbol == track.on) else { return Ok(()) };
     let body = eyes.robot.description();
@@ -270,7 +274,7 @@ fn picked_up(
     Ok(format!("the hand is closed to {:.3} m around it", grasped.width_m))
 }
 
-/// Handles a failed pick-up: the grasp may have moved the object.
+/// Handles a failed pick-up: a grasp that slipped may have moved the object, so its place is forgotten.
 fn pick_up_failed(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -315,7 +319,7 @@ fn put_down(
     ))
 }
 
-/// Handles a failed put-down: the object may have been lost on the way.
+/// Handles a failed put-down: an object that slipped from the hand counts as lost.
 fn put_down_failed(
     mind: &mut Mind,
     _: Eyes<'_>,

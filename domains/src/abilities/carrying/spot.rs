@@ -10,13 +10,13 @@ use crate::situation::Situation;
 pub(super) const USUAL_RADIUS_M: f64 = 0.06;
 /// Minimum gap to other objects and to the surface's edge, metres.
 const GAP_M: f64 = 0.05;
-/// Spacing of the tried places, metres.
+/// Spacing of the candidate places, metres.
 const GRID_M: f64 = 0.04;
 /// Heights above the surface at which a place must be observed free, metres.
 const FREE_AT_M: [f64; 2] = [0.04, 0.10];
 
-/// Free place on a surface nearest to the body and within reach from a viewpoint: seen empty, or
-/// with `if_unseen` not seen at all; `None` if there is none.
+/// Point on surface `on` for an object of `radius_m`, within reach from candidate `from` and nearest to
+/// it; `None` if there is none. Its space was observed free or, with `if_unseen`, not observed at all.
 pub(super) fn free(
     s: &Situation,
     from: usize,

@@ -18,43 +18,48 @@ use crate::surface::KnownSurface;
 
 /// Maximum range of depth returns used for recognition, metres.
 const RANGE_M: f64 = 3.0;
-/// Number of newest cameras from which the merged views are examined.
+/// Number of newest camera poses from which the merged cloud is examined for further candidates.
 const TOGETHER: usize = 3;
-/// Guesses of all views together that are looked at, the surest first.
+/// Maximum number of candidates that are verified against all views, the most confident first.
 const GUESSES: usize = 12;
-/// Difference below which two candidates are one, metres and radians.
+/// Differences in position (metres) and orientation (radians) below which two candidates of one model
+/// are the same.
 const SAME: (f64, f64) = (0.03, 0.35);
-/// Minimum probability of a reported candidate.
+/// Minimum confidence of a reported match.
 const LEAST: f64 = 0.05;
-/// Distance from a learned model's surface within which points belong to the object, metres; half
-/// of it is left by view alignment.
+/// Distance from a learned model's surface within which points belong to the object, metres; half of it
+/// allows for the error of view alignment.
 const OF_IT_M: f32 = 0.015;
 /// Minimum share of an object's points that a learned model must explain to name the object.
 const SHARE: f64 = 0.6;
-/// Margin around a surface within which an object's centre may lie, metres.
+/// Distance beyond a surface's outline within which an object's centre may lie, metres.
 const BESIDE_M: f64 = 0.03;
+/// Heights above a surface between which an object's centre may lie, metres.
 const ABOVE_M: (f64, f64) = (-0.02, 0.6);
-/// Prior probability that some object is the sought thing before it was looked at; and probability that a
-/// look at its surface does not recognise it: 8 of 20 did not, in twelve searches of `tests/learning.py`,
-/// which is 1 of 2.5.
+/// Prior probability that some object is the sought learned thing.
 const PRIOR: f64 = 0.3;
+/// Probability that one view of a learned object does not recognise it: 8 of 20 views in twelve searches
+/// of `tests/learning.py`.
 const MISSED: f64 = 0.4;
-/// Minimum share of observed sides of a complete model; below it, the object may be larger than the
-/// model.
+/// Minimum share of sides seen for a learned model to count as complete; below it, the object may be
+/// larger than the model.
 const HALF: f64 = 0.5;
-/// An object longer than the learned one by this margin, metres, is another one; so is a well seen
-/// object that, with all neighbours that may be parts of it, has less than this share of the
-/// length. Probability that remains in those cases.
+/// Margin by which an object must be longer than a learned one to be another object, metres.
 const LONGER_M: f64 = 0.03;
+/// Share of a learned object's length below which a well-seen object, with all neighbours that may be
+/// parts of it, is another object.
 const SHORTER: f64 = 0.6;
+/// Gap within which a neighbour may be a part of the same object, metres.
 const BESIDE_IT_M: f64 = 0.04;
+/// Remaining probability that an object of another length is the learned one.
 pub const NOT_IT: f64 = 0.002;
 
-/// Cached recognition results, by view time.
+/// Cache of recognition results of single views, by timestamp of the view in nanoseconds.
 #[derive(Clone, Default)]
 struct Glances {
     by_time: BTreeMap<i64, Arc<Glance>>,
-    /// Number of scene disturbances when the glance was taken.
+    /// Number of scene disturbances when the cached results were computed; a later disturbance
+    /// invalidates them.
     disturbed: usize,
 }
 
@@ -65,7 +70,8 @@ pub(super) fn forget(mind: &mut Mind) {
     mind.known.states.get_mut::<Glances>().by_time.clear();
 }
 
-/// Cached recognition results that are still valid; those from before a disturbance are not.
+/// Takes the recognition results out of the cache; none if the scene was disturbed since they were
+/// computed.
 fn glances(mind: &mut Mind) -> BTreeMap<i64, Arc<Glance>> {
     let disturbed = mind.disturbed;
     let kept: &mut Glances = mind.known.states.get_mut();
@@ -86,7 +92,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Share of the given points (world) that the object explains.
+    /// Share of the given points (world frame) that lie on the object, 0 to 1.
     pub fn share_of(&self, points: &[Point3<f32>]) -> f64 {
         let near = |p: &&Point3<f32>| self.tree.nearest(p, OF_IT_M).is_some();
         points.iter().filter(near).count() as f64 / points.len().max(1) as f64
@@ -96,11 +102,11 @@ impl Found {
 /// Views with their camera poses, and the up direction if known.
 type Shown<'a> = (&'a [(&'a View, Isometry3<f64>)], Option<Vector3<f64>>);
 
-/// Candidate with its pose in the world.
+/// Candidate with the pose of its model in the world.
 type Placed = (Guess, Isometry3<f64>);
 
-/// Learned objects recognised in the views (with camera poses), most confident first, without
-/// overlaps. Candidates come from single views and from `suggested`; `holds` restricts positions.
+/// Learned objects recognised in the views, most confident first, without overlaps. Candidates come from
+/// single views and from `suggested`; only those whose position satisfies `holds` are verified.
 pub(super) fn find(
     mind: &mut Mind,
     (views, up): Shown<'_>,
@@ -151,10 +157,10 @@ pub(super) fn find(
     apart
 }
 
-/// Recognition options for the given up direction. Models have z up; without a known up direction,
-/// any orientation is tried.
+/// Recognition options for an up direction in the world. Models have z up; for an unknown or tilted up
+/// direction, any orientation is tried.
 fn options(up: Option<Vector3<f64>>) -> KnowOptions {
-    /// Farther from z is another up, radians.
+    /// Largest angle from z at which the up direction is that of the models, radians.
     const LEVEL_RAD: f64 = 0.1;
     let up = up.filter(|up| up.angle(&Vector3::z()) < LEVEL_RAD).map(|_| Vector3::z_axis());
     KnowOptions { range_m: RANGE_M, up, ..KnowOptions::default() }
@@ -164,8 +170,7 @@ fn placed(glance: &Glance, world_from_camera: &Isometry3<f64>) -> Vec<Placed> {
     glance.guesses.iter().map(|guess| (*guess, world_from_camera * guess.camera_from_model)).collect()
 }
 
-/// Candidates from the merged cloud, rendered from the newest camera: less noisy than a single
-/// view.
+/// Candidates found in the merged cloud as seen from the newest cameras: less noisy than a single view.
 fn together(
     models: &Models,
     surface: &KnownSurface,
@@ -212,8 +217,8 @@ pub(super) fn stands_on(surface: &KnownSurface, middle: &Point3<f64>) -> bool {
     surface.covers(middle, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
 }
 
-/// Assigns learned objects to the percepts on a surface; percepts of one object are merged.
-/// `merged`: cloud of all views, indexed by the percepts.
+/// Assigns learned objects to the percepts on a surface; percepts of one object are merged. Indices of
+/// the percepts refer to the points of `merged`.
 pub(super) fn explain(
     mind: &mut Mind,
     on: usize,
@@ -265,8 +270,7 @@ pub(super) fn explain(
     explained
 }
 
-/// Maximum extent of a percept together with near neighbours that may belong to the same object,
-/// metres.
+/// Maximum extent of a percept together with near neighbours that may belong to the same object, metres.
 fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
     let reach = |p: &Percept| 0.5 * p.size_m[0].hypot(p.size_m[1]);
     let near = |p: &&Percept| {
@@ -278,8 +282,8 @@ fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
     wide_m.hypot(high_m)
 }
 
-/// Sets position and size of a percept from the recognised model: centre above the support, and
-/// sides.
+/// Sets a percept's horizontal position and its size from the recognised model; its height above the
+/// floor stays.
 fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
     let middle = Point3::from(found.judged.world_from_model.translation.vector);
     let up_m = surface.up.dot(&(middle - percept.position_m));
@@ -290,8 +294,8 @@ fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
     }
 }
 
-/// Sets name probabilities of a percept: the recognised object, or (`Err`: extent with neighbours,
-/// metres) those that recognition may have missed.
+/// Sets the name probabilities of a percept. `found` is the recognised object, or as `Err` the extent of
+/// the percept with its neighbours, metres, by which recognition may have missed an object.
 pub fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     let mut of_things: Vec<(String, f64)> = Vec::new();
     let is = found.ok().map(|f| (f.thing, f.judged.confidence.clamp(0.0, 0.999)));
@@ -322,9 +326,9 @@ pub fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     }
 }
 
-/// Probability that recognition missed the learned object in this percept, whose extent with
-/// neighbours is at most `together_m`. Views of sides that were never learned carry no evidence,
-/// and an incompletely seen object may be larger than known.
+/// Probability that recognition missed the learned object in this percept, whose extent with neighbours
+/// is at most `together_m` metres. Views of sides that were never learned carry no evidence, and an
+/// incompletely learned object may be larger than its model.
 pub fn missed(percept: &Percept, thing: &LearnedThing, together_m: Option<f64>) -> f64 {
     let (low, high) = thing.cloud.bounds().unwrap_or_default();
     let longest_m = f64::from((high - low).norm());

@@ -9,7 +9,7 @@ use crate::ability::{Deed, Meaning, Reads, argument, quickest_first};
 use crate::looking::looks;
 use crate::situation::{Situation, holding};
 
-/// Every call.
+/// All calls of *learning*.
 pub(super) const ALL: &[Meaning] = &[Meaning {
     name: "expected-sides",
     reads: &[Reads::all("faced")],
@@ -37,7 +37,8 @@ fn gain(s: &Situation, novelty: &Novelty, from: &str, before: &[&str]) -> f64 {
     fresh.len() as f64 / DIRECTIONS as f64
 }
 
-/// Reason for a look from a pose.
+/// Clause on what a view from a pose would add to the seen sides of a novel object; empty for an unknown
+/// object.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     let Some(novelty) = s.news().novelty(arguments[1]) else { return String::new() };
     format!(
@@ -47,8 +48,8 @@ pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     )
 }
 
-/// Choices without a plan, best first: useful visits and looks by travel time, then modelling an
-/// open novelty, then search looks.
+/// Fallback when the planner finds no plan, best first: visits and useful views by travel time; if there
+/// are none, modelling an open novelty, else search views.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let visits = s.news().places.iter().filter(|p| !p.is_visited).map(|p| (p.waypoint.clone(), None));
     let open = s.news().novelties.iter().filter(|n| n.fate == Fate::Open);

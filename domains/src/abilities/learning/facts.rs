@@ -1,11 +1,11 @@
-//! The words that *learning* states.
+//! Predicates and functions whose values *learning* states.
 
 use super::news::{Fate, Novelty};
 use super::stands;
 use crate::ability::Fact;
 use crate::situation::Situation;
 
-/// Every fact.
+/// All facts of *learning*.
 pub(super) const ALL: &[Fact] = &[
     Fact {
         name: "waypoint",

@@ -116,8 +116,8 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// Two waypoints per surface on opposite sides, so that one look sees the space hidden from the
-/// other.
+/// At most two viewpoints of a surface, those farthest apart on its ring of `poses` candidates, so that
+/// one sees the space hidden from the other.
 fn waypoints(candidates: &[Candidate], surface: &str, poses: usize) -> Vec<Candidate> {
     let number = |c: &Candidate| c.symbol.strip_prefix(&format!("{surface}-"))?.parse::<usize>().ok();
     let ring: Vec<(usize, &Candidate)> = candidates.iter().filter_map(|c| Some((number(c)?, c))).collect();
@@ -136,7 +136,8 @@ fn waypoints(candidates: &[Candidate], surface: &str, poses: usize) -> Vec<Candi
     }
 }
 
-/// Initial state of a run: waypoints to visit, and their state at earlier visits.
+/// Sets the places to visit in a run, each with what earlier runs know of it; nothing unless the goal
+/// asks for visits.
 fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     if goal.asked.of_word(PATROLLED).next().is_none() {
         return;

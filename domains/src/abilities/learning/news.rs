@@ -19,20 +19,19 @@ use crate::situation::Situation;
 use crate::states::{States, state};
 use crate::symbol::symbol;
 
-/// Number of viewing directions around an object that are distinguished.
+/// Number of equal sectors into which directions around an object are divided.
 pub(super) const DIRECTIONS: usize = 36;
-/// Number of directions (15 degrees each) to either side of the viewing direction that a look
-/// covers.
+/// Number of sectors (10 degrees each) that a view covers to either side of the sector of its viewpoint.
 const TO_EITHER_SIDE: usize = 1;
 
 /// Visited places, novel objects and learned objects.
 #[derive(Clone, Default)]
 pub struct News {
-    /// Places to visit, by pose symbol.
+    /// Places to visit, in the order of the surfaces.
     pub places: Vec<Place>,
-    /// Novel objects that match no learned one.
+    /// Objects to be viewed from all around: novel ones, and learned ones known from too few sides.
     pub novelties: Vec<Novelty>,
-    /// Changes without anything to learn.
+    /// Changes since earlier visits that leave nothing to learn.
     pub changes: Vec<Difference>,
     /// Learned objects, oldest first: those of earlier runs, then those of this run.
     pub things: Vec<LearnedThing>,
@@ -40,11 +39,11 @@ pub struct News {
     pub learned: usize,
     /// Learned objects prepared for recognition; `None` if nothing was learned.
     pub models: Option<Arc<Models>>,
-    /// Records of the looks that novelties are learned from.
+    /// Ids of the recorded views that objects are learned from.
     pub records: Vec<RecordId>,
 }
 
-/// Visited place.
+/// Place to visit: a surface as seen from a waypoint.
 #[derive(Clone)]
 pub struct Place {
     /// Symbol of the waypoint.
@@ -55,66 +54,66 @@ pub struct Place {
     pub room: Option<Arc<MetaRoom>>,
     /// True if visited in this run.
     pub is_visited: bool,
-    /// Reason why a visit could not be compared with earlier ones.
+    /// Reason why the visit of this run could not be compared with earlier ones, if so.
     pub strange: Option<String>,
 }
 
-/// Something new on a surface.
+/// Object on a surface that is viewed from all around: novel, or learned from too few sides.
 #[derive(Clone)]
 pub struct Novelty {
     /// PDDL symbol.
     pub symbol: String,
     /// Symbol of the surface that the object stands on.
     pub on: String,
-    /// Centre in the map.
+    /// Centre in the map frame, metres.
     pub centre: Point3<f64>,
     /// Size of the bounding box of the detected part, metres.
     pub size_m: [f64; 3],
     /// Views of the object; the first is the one in which it was detected.
     pub looks: Vec<NoveltyView>,
-    /// Pixels of the object in that first view.
+    /// Pixels of the object in the first view, true where the object is.
     pub mask: Arc<Vec<bool>>,
-    /// Stand on each line around the object, by pose symbol; `None` where the body does not fit.
+    /// Viewpoint on each line around the object, by pose symbol; `None` where the body does not fit.
     pub stands: Vec<Option<String>>,
-    /// For each stand, true if the route to the next one is no detour.
+    /// For each viewpoint, true if the route to the next one is no detour.
     pub joined: Vec<bool>,
     /// Index in [`News::things`] of the learned object that matches but is known from too few
     /// sides.
     pub taken_for: Option<usize>,
-    /// Outcome for the object.
+    /// State of learning the object.
     pub fate: Fate,
 }
 
-/// A look at something new.
+/// View of a novel object.
 #[derive(Clone)]
 pub struct NoveltyView {
-    /// Symbol of the pose of the view.
+    /// Symbol of the pose from which the view was taken.
     pub from: String,
     /// View of the object.
     pub view: Arc<View>,
 }
 
-/// The fate of a novel object.
+/// State of learning a novel object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fate {
     /// Not learned yet.
     Open,
     /// Learned in this run.
     Learned {
-        /// Name.
+        /// Name given to the object.
         name: String,
         /// Numbers of registered views and of all views.
         looks: (usize, usize),
-        /// Share of directions around the object from which it was seen.
+        /// Share of directions around the object from which it was seen, 0 to 1.
         sides: f64,
     },
     /// Matches an object learned before.
     Known {
-        /// Name.
+        /// Name of the object learned before.
         name: String,
-        /// Probability of the match.
+        /// Probability of the match, 0 to 1.
         confidence: f64,
-        /// Modelling result, in words, if it was viewed from all around.
+        /// Sentence on the improvement of the known model, if the object was viewed from all around.
         model: Option<String>,
     },
     /// Cannot be learned, with the reason.
@@ -124,32 +123,32 @@ pub enum Fate {
 /// Change without anything to learn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Difference {
-    /// Something that was learned has come or has been moved.
+    /// A learned object stands elsewhere than before.
     Came {
         /// Name of the object.
         name: String,
-        /// Present position.
+        /// Present position, map frame.
         at: Point3<f64>,
-        /// Position before.
+        /// Position before, map frame.
         before: Point3<f64>,
     },
     /// A learned object is no longer where it was seen.
     Left {
-        /// Name.
+        /// Name of the object.
         name: String,
-        /// Former position.
+        /// Former position, map frame.
         at: Point3<f64>,
     },
     /// Part of the static structure is gone.
     Gone {
-        /// Middle.
+        /// Centre, map frame.
         at: Point3<f64>,
         /// Size of the bounding box, metres.
         size_m: [f64; 3],
     },
     /// An object on no surface has appeared.
     Beside {
-        /// Middle.
+        /// Centre, map frame.
         at: Point3<f64>,
         /// Size of the bounding box, metres.
         size_m: [f64; 3],
@@ -157,7 +156,7 @@ pub enum Difference {
 }
 
 impl News {
-    /// Knowledge at the beginning of a run.
+    /// State at the beginning of a run: the objects learned in earlier runs.
     pub(crate) fn of_past(past: Option<&Past>) -> Self {
         let things = past.map(|p| p.remembered.things.clone()).unwrap_or_default();
         News { models: Models::of(&things), things, ..News::default() }
@@ -174,12 +173,12 @@ impl News {
         later.visited = news.visited(std::mem::take(&mut later.visited), pose, past.now_unix_s);
     }
 
-    /// The learned object of a symbol, as the lexicon makes symbols of names.
+    /// Learned object whose name has this symbol.
     pub fn thing(&self, of: &str) -> Option<&LearnedThing> {
         self.things.iter().find(|t| symbol(&t.name) == of)
     }
 
-    /// The novelty of a symbol.
+    /// Novel object with a symbol.
     pub fn novelty(&self, of: &str) -> Option<&Novelty> {
         self.novelties.iter().find(|n| n.symbol == of)
     }
@@ -191,7 +190,8 @@ impl News {
         format!("thing {number}")
     }
 
-    /// Visits for later runs to remember: places of this run as they are now, others as remembered.
+    /// Visits for later runs to remember: those of `before`, replaced by this run's. `at` gives the pose
+    /// of a waypoint (x, y in metres, yaw in radians); `now` is the Unix time in seconds.
     fn visited(&self, before: Vec<Visited>, at: impl Fn(&str) -> Option<[f64; 3]>, now: f64) -> Vec<Visited> {
         let seen: Vec<Visited> = self
             .places
@@ -215,33 +215,34 @@ impl Novelty {
         0.5 * self.size_m[0].hypot(self.size_m[1])
     }
 
-    /// Direction from the object to a point, one of [`DIRECTIONS`].
+    /// Sector of the direction from the object to a point, below [`DIRECTIONS`]; counter-clockwise from
+    /// the map's x.
     fn direction(&self, from: &Point3<f64>) -> usize {
         let off = from - self.centre;
         let turn = off.y.atan2(off.x).rem_euclid(TAU);
         (turn / TAU * DIRECTIONS as f64).round() as usize % DIRECTIONS
     }
 
-    /// Directions of the object that a look from a point shows.
+    /// Sectors around the object that a view from a point shows.
     fn shown(&self, from: &Point3<f64>) -> impl Iterator<Item = usize> + use<> {
         let middle = self.direction(from) + DIRECTIONS - TO_EITHER_SIDE;
         (0..=2 * TO_EITHER_SIDE).map(move |k| (middle + k) % DIRECTIONS)
     }
 
-    /// Directions from which the object was seen, in the frame of the object turned by
-    /// `turned_rad`; one bit each.
+    /// Sectors from which the object was seen, as bits, counted in a frame of the object that is turned
+    /// by `turned_rad` about the vertical.
     pub(super) fn directions(&self, turned_rad: f64) -> u64 {
         let turned = (turned_rad.rem_euclid(TAU) / TAU * DIRECTIONS as f64).round() as usize;
         self.seen().iter().fold(0, |all, k| all | 1 << ((k + DIRECTIONS - turned % DIRECTIONS) % DIRECTIONS))
     }
 
-    /// Directions from which the object was seen.
+    /// Sectors from which the object was seen.
     pub(super) fn seen(&self) -> BTreeSet<usize> {
         let eye = |l: &NoveltyView| Point3::from(l.view.world_from_camera.translation.vector);
         self.looks.iter().map(eye).flat_map(|eye| self.shown(&eye)).collect()
     }
 
-    /// The directions that a look from a pose shows.
+    /// Sectors that a view from a pose shows; none for a station.
     pub(super) fn shown_from(&self, s: &Situation, pose: &str) -> Vec<usize> {
         let place = s.candidate(pose).ok().map(|n| &s.candidates[n].place);
         match place {
@@ -252,13 +253,13 @@ impl Novelty {
         }
     }
 
-    /// Stands from which the object may still be viewed.
+    /// Reachable viewpoints around the object from which it was not viewed yet.
     pub(super) fn open_stands<'a>(&'a self, s: &'a Situation) -> impl Iterator<Item = &'a String> + 'a {
         let can_go = |pose: &&String| s.candidate(pose).is_ok_and(|n| !s.out_of_reach.contains(&n));
         self.stands.iter().flatten().filter(can_go).filter(|pose| self.looks.iter().all(|l| l.from != **pose))
     }
 
-    /// Share of the directions that are unseen but visible from where the body fits.
+    /// Share of all sectors that are unseen but visible from a remaining viewpoint, 0 to 1.
     pub(super) fn unfaced(&self, s: &Situation) -> f64 {
         let seen = self.seen();
         let open: BTreeSet<usize> = self.open_stands(s).flat_map(|pose| self.shown_from(s, pose)).collect();
@@ -268,7 +269,7 @@ impl Novelty {
 
 /// Learned objects prepared for recognition.
 pub struct Models {
-    /// Surfels and features of the models.
+    /// Library of the models' surfels and features.
     pub(super) known: Library,
     /// Index in [`News::things`] of each model; incompletely seen objects have no model.
     pub(super) things: Vec<usize>,
@@ -287,9 +288,9 @@ impl Models {
     }
 }
 
-/// Object model of a learned object, for visibility: a body of the same size.
+/// Box of a learned object's size, as the object model for computing visibility.
 fn model(thing: &LearnedThing) -> ObjectModel {
-    /// Relative tolerance of a size comparison; the object may rest on another side.
+    /// Relative tolerance of the size, as the object may rest on another side.
     const OFF: f64 = 0.1;
     let (low, high) = thing.cloud.bounds().unwrap_or_default();
     let size: Vector3<f64> = (high - low).cast();
@@ -319,12 +320,12 @@ pub fn called(name: &str) -> String {
 state!(News);
 
 impl Known {
-    /// Novel and learned objects.
+    /// State of *learning*: visited places, novel objects and learned objects.
     pub(super) fn news(&self) -> &News {
         self.states.get()
     }
 
-    /// Mutable access to novel objects and learned objects.
+    /// Mutable access to the state of *learning*.
     pub(super) fn news_mut(&mut self) -> &mut News {
         self.states.get_mut()
     }

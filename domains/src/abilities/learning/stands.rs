@@ -1,4 +1,4 @@
-//! Viewpoints around a novel object, and routes from one to the next (section IV-A of the paper).
+//! Viewpoints around a novel object, and routes from one to the next (Fäulhammer et al., section IV-A).
 
 use std::collections::BTreeMap;
 
@@ -11,22 +11,23 @@ use crate::mind::Mind;
 use crate::situation::Situation;
 use crate::viewpoint::Candidate;
 
-/// Number of lines around an object, on each of which a stand is sought: one every 30 degrees
-/// (paper: 20 lines, and a look every 15 degrees).
+/// Number of lines around an object, on each of which a viewpoint is sought: one every 30 degrees
+/// (paper: 20 lines, and a view every 15 degrees).
 const LINES: usize = 12;
 /// Height band of obstacles to the body, metres; with a tilt error of two degrees, the floor two
 /// metres away seems as high as the lower bound.
 const BAND_M: (f64, f64) = (0.15, 1.5);
-/// Minimum number of returns of one look in a cell that makes the cell occupied; at depth edges,
+/// Minimum number of returns of one view in a grid cell for the cell to be occupied; at depth edges,
 /// single returns hang in the air.
 const RETURNS: usize = 8;
+/// Edge length of the grid cells of obstacles, metres.
 const CELL_M: f32 = 0.05;
 /// Clearance between the footprint and observed obstacles, metres: about two standard deviations of
 /// localisation.
 const CLEAR_M: f64 = 0.06;
 
-/// Finds stands around a point, one per line, and adds them as poses; also, for each pair of
-/// neighbours, true if the route between them is no detour.
+/// Finds viewpoints around a point, one per line (`None` where the body does not fit), and adds them as
+/// candidates. The second list is true where the route from a viewpoint to the next is no detour.
 pub(super) fn make(
     mind: &mut Mind,
     robot: &dyn Robot,
@@ -69,7 +70,7 @@ pub(super) fn make(
     (poses.into_iter().map(|pose| pose.map(|p| p.symbol)).collect(), joined)
 }
 
-/// Floor position of a place, if the place is a pose.
+/// Floor position of a place; `None` for a station.
 fn at(place: &Place) -> Option<Point2<f64>> {
     match place {
         Place::Pose(pose) => Some(pose.point()),
@@ -77,7 +78,8 @@ fn at(place: &Place) -> Option<Point2<f64>> {
     }
 }
 
-/// Obstacles near a place: observed points, and those of the body's map.
+/// Points of obstacles within `within_m` + 1 metres of a place: observed points in the height band, and
+/// the occupied cells of the body's map.
 fn obstacles(
     robot: &dyn Robot,
     centre: &Point3<f64>,
@@ -106,18 +108,18 @@ fn obstacles(
     all
 }
 
-/// Position of a pose on the floor.
+/// Floor position of a pose symbol; `None` for a station or an unknown symbol.
 fn point(s: &Situation, pose: &str) -> Option<Point2<f64>> {
     at(&s.candidates[s.candidate(pose).ok()?].place)
 }
 
-/// Reachable stands by line, except those given up.
+/// Viewpoints by line; `None` where the body does not fit or a drive has failed.
 fn left(s: &Situation, novelty: &Novelty) -> Vec<Option<String>> {
     let can_go = |pose: &&String| s.candidate(pose).is_ok_and(|n| !s.out_of_reach.contains(&n));
     novelty.stands.iter().map(|stand| stand.as_ref().filter(can_go).cloned()).collect()
 }
 
-/// Poses around the object, joined into sequences whose successive poses are reachable without a
+/// Reachable viewpoints around the object, in sequences whose successive members are connected without a
 /// detour.
 fn strings(s: &Situation, novelty: &Novelty) -> Vec<Vec<String>> {
     let left = left(s, novelty);
@@ -130,7 +132,7 @@ fn strings(s: &Situation, novelty: &Novelty) -> Vec<Vec<String>> {
     strung.iter().map(|string| string.iter().filter_map(named).collect()).collect()
 }
 
-/// Neighbouring stands with a route that is no detour.
+/// Pairs of neighbouring viewpoints whose connecting route is no detour.
 pub(super) fn neighbours(s: &Situation, novelty: &Novelty) -> Vec<(String, String)> {
     let strings = strings(s, novelty);
     let mut pairs: Vec<(String, String)> = strings
@@ -147,8 +149,8 @@ pub(super) fn neighbours(s: &Situation, novelty: &Novelty) -> Vec<(String, Strin
     pairs
 }
 
-/// Stands that may be approached from anywhere: ends of connected chains and, around the next
-/// object, the nearest open stand.
+/// Viewpoints that may be approached from anywhere: ends of connected sequences and, if the object is
+/// next in turn, its nearest unused viewpoint.
 pub(super) fn ways_in(s: &Situation, novelty: &Novelty, is_next: bool) -> Vec<String> {
     let strings = strings(s, novelty);
     let mut ends: Vec<String> =

@@ -27,17 +27,19 @@ use crate::surface::KnownSurface;
 /// Search radius for the localisation error between two visits, metres: localisation errs by centimetres and
 /// by degrees, which at a distance of two metres are centimetres, too.
 const SEARCH_M: f32 = 0.15;
-/// Share of differences above which a visit is rejected, because the body is not where it believes
-/// to be.
+/// Minimum share of differing points for which a visit is rejected, because the body is not where it
+/// believes to be.
 const STRANGE: f64 = 0.3;
-/// Limits for an object on a surface: the height of its lowest point above the surface, and the distance of
-/// its centre beside the surface, metres.
+/// Maximum height of an object's lowest point above or below the surface that it stands on, metres.
 const ON_M: f64 = 0.06;
+/// Maximum distance of an object's centre beyond the outline of its surface, metres.
 const BESIDE_M: f64 = 0.05;
-/// Second-longest side below which a change counts as an edge that was measured differently, metres.
+/// Second-longest side of a change, metres, below which the change is only an edge that was measured
+/// differently.
 const SLIVER_M: f64 = 0.04;
-/// Minimum width and aspect ratio of an object that counts as a table edge or a leg.
+/// Second-longest side of an elongated change, metres, below which the change is a table edge or a leg.
 const EDGE_M: f64 = 0.08;
+/// Minimum ratio of the longest side to the second-longest of such an elongated change.
 const LONG: f64 = 6.0;
 /// Distance beyond a novel object's radius within which an appeared part belongs to the object,
 /// metres.
@@ -47,20 +49,23 @@ const OF_IT_M: f64 = 0.1;
 const OVER_IT_M: f32 = 0.1;
 /// Distance below which two detections are the same object, metres.
 const SAME_M: f64 = 0.12;
-/// Minimum confidence, and minimum share of explained points, to identify an object with a learned
-/// one.
+/// Minimum confidence of a match to identify an object with a learned one.
 const SURE: f64 = 0.8;
+/// Minimum share of an object's points that the matching learned object explains.
 const EXPLAINED: f64 = 0.5;
-/// Minimum share of observed sides of a complete model; a less completely known object is viewed
-/// from all around when met again.
+/// Minimum share of seen sides for a learned object to be complete; a less complete one is viewed from
+/// all around when met again.
 const KNOWN_ROUND: f64 = 0.8;
-/// Ratio, and margin in metres, between the model's and the noticed size above which the model
-/// includes something it stands on or beside.
+/// Ratio between the model's size and the detected one above which, with [`GROWN_M`] added, the model
+/// includes something that the object stands on or beside.
 const GROWN: f64 = 2.0;
+/// Margin on the sides of a model in that comparison, metres.
 const GROWN_M: f64 = 0.1;
-/// Minimum share of an object's points that a view looked through, and minimum number of points
-/// that it looked at, for the object to count as gone.
+/// Minimum share of the observed points of an object that a view looked through for the object to count
+/// as gone.
 const THROUGH: f64 = 0.6;
+/// Minimum number of points of an object that a view must observe, solid or looked through, to decide
+/// that.
 const LOOKED_AT: u32 = 50;
 /// Distance behind a point from which a depth reading counts as looking through it, metres.
 const BEYOND_M: f64 = 0.03;
@@ -128,8 +133,8 @@ pub(super) fn visit(
 /// localisation error (the alignment is wrong or the body is lost, and all static structure would
 /// look new), or no alignment was found.
 pub fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, view: &View) -> Option<String> {
-    /// Minimum assumed alignment error of a visit, metres and radians: half of the comparison
-    /// tolerance.
+    /// Minimum assumed alignment error of a visit, metres and radians: half of the tolerance of the
+    /// comparison.
     const LAID: (f64, f64) = (0.005, 0.005);
     let [sigma_m, sigma_rad] = [body.pose_sigma_m.max(LAID.0), body.pose_sigma_rad.max(LAID.1)];
     let body = &Description { pose_sigma_m: sigma_m, pose_sigma_rad: sigma_rad, ..body.clone() };
@@ -141,13 +146,13 @@ pub fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, vie
     (off >= STRANGE).then(|| format!("{:.0} % of what is seen differs from what was there", 1e2 * off))
 }
 
-/// Share of the view that appeared since earlier visits.
+/// Share of the points of a view that appeared since earlier visits, 0 to 1.
 fn differing(visit: &Visit, view: &View) -> f64 {
     let came: usize = visit.appeared.iter().map(|a| a.mask.iter().filter(|m| **m).count()).sum();
     came as f64 / view.cloud.count_finite().max(1) as f64
 }
 
-/// Report of a visit.
+/// Report of a visit, as it is collected.
 #[derive(Default)]
 struct Told {
     waypoint: String,
@@ -167,8 +172,8 @@ impl Told {
     }
 }
 
-/// Updates from a visit: recognised learned objects are located; other appeared objects on a
-/// surface are novel.
+/// Updates the state from a comparison with earlier visits: recognised learned objects are located;
+/// other objects that appeared on a surface are novel.
 fn take_in(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -251,8 +256,8 @@ fn whole(surfaces: &[KnownSurface], appeared: Vec<Appeared>) -> Vec<Appeared> {
     all
 }
 
-/// True if a piece hangs over another: their centres overlap from above, with a small gap between
-/// them.
+/// True if a piece hangs over another: from above, one covers the centre of the other, with a small gap
+/// between them.
 pub fn is_over(piece: &Cloud, below: &Cloud) -> bool {
     let (Some(above), Some(under)) = (piece.bounds(), below.bounds()) else { return false };
     let holds = |(low, high): (Point3<f32>, Point3<f32>), (l, h): (Point3<f32>, Point3<f32>)| {
@@ -273,7 +278,7 @@ fn is_sliver(cloud: &Cloud) -> bool {
     size_m[1] < SLIVER_M || size_m[1] < EDGE_M && size_m[2] > LONG * size_m[1]
 }
 
-/// Size and position for people.
+/// Text of a size (`[w, d, h]`, metres, shown in centimetres) and a position (map frame, metres).
 pub(super) fn size([w, d, h]: &[f64; 3], at: &Point3<f64>) -> String {
     let [w, d, h] = [w, d, h].map(|m| 1e2 * m);
     format!("{w:.0} x {d:.0} x {h:.0} cm at ({:.2}, {:.2}, {:.2}) m", at.x, at.y, at.z)
@@ -306,7 +311,7 @@ fn change(mind: &mut Mind, change: Difference) {
     }
 }
 
-/// True if a learned object was already recognised there in this run from another waypoint.
+/// True if a learned object was already recognised at this cloud in this run, from another waypoint.
 fn is_known_there(mind: &Mind, cloud: &Cloud) -> bool {
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let (at, size_m) = extent(cloud);
@@ -314,7 +319,7 @@ fn is_known_there(mind: &Mind, cloud: &Cloud) -> bool {
     mind.known.news().things.iter().any(|t| t.seen.unix_s == now_unix_s && (t.seen.at_m - at).norm() < near_m)
 }
 
-/// Records a recognised learned object at its place; detections there are no longer novel.
+/// Records the new place of a recognised learned object and settles novelties there; returns a sentence.
 fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
     let at = Point3::from(f.judged.world_from_model.translation.vector);
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
@@ -374,7 +379,8 @@ pub fn new(
     Some(symbol)
 }
 
-/// Learned objects on a surface that this view has looked through, now gone.
+/// Sentences on the learned objects of a surface that the depth map looked through; they are listed as
+/// gone.
 fn left(mind: &mut Mind, on: &str, map: &DepthMap) -> Vec<String> {
     let is_there = |t: &&LearnedThing| t.seen.on == on;
     let of = |t: &LearnedThing| (t.name.clone(), t.seen.at_m, t.cloud.clone());
@@ -397,7 +403,7 @@ fn left(mind: &mut Mind, on: &str, map: &DepthMap) -> Vec<String> {
     said
 }
 
-/// Handles a look at a novel object.
+/// Handles a view of a novel object; returns a sentence.
 pub(super) fn face(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -467,7 +473,8 @@ fn make_ready(mind: &mut Mind) {
     again::forget(mind);
 }
 
-/// Handles a modelling result: the object is learned, known after all, or cannot be learned.
+/// Handles a modelling result: the object is learned, known after all, or cannot be learned; returns a
+/// sentence.
 pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Result<String, WorldError> {
     let of = novelty(mind, what)?.clone();
     let poses = |n: usize| modelled.keyframes.get(n).map(|k| k.world_from_camera);

@@ -74,7 +74,7 @@ fn told(mind: &Mind, s: &Situation, ended: &Ended, is_to_learn: bool) -> (Verdic
     (verdict, format!("{}; {looks}", said.join("; ")))
 }
 
-/// The reasons the answer may be incomplete.
+/// Reasons why the answer may be incomplete.
 fn open<'a>(
     s: &Situation,
     places: impl Iterator<Item = &'a Place>,

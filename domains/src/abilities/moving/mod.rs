@@ -108,7 +108,7 @@ pub const ABILITY: Ability = Ability {
     ..Ability::named("moving", "drives on the map, opens doors")
 };
 
-/// `(beside ?pose ?door)`: the poses before each door.
+/// States `(beside ?pose ?door)` for the poses before each door.
 fn beside(s: &Situation) -> Vec<String> {
     let symbols = |d: &crate::known::KnownDoor| {
         let own = format!("{}-side-", d.symbol);
@@ -118,7 +118,7 @@ fn beside(s: &Situation) -> Vec<String> {
     s.doors.iter().flat_map(symbols).collect()
 }
 
-/// `(in ?surface ?room)`, from the map.
+/// States `(in ?surface ?room)` for the surfaces whose room is in the map.
 fn in_room(s: &Situation) -> Vec<String> {
     // Of a room that the map does not have nothing can be said.
     let has = |name: &&String| s.robot.rooms().iter().any(|room| room.name == **name);

@@ -1,5 +1,5 @@
-//! `[path-cost ?from ?to]`: driving time on the map past the doors that are shut then, seconds;
-//! infinite where no route leads.
+//! `[path-cost ?from ?to]`: driving time on the map, seconds, past the doors that are shut at that point
+//! of the plan; infinite where no route leads.
 
 use std::collections::BTreeSet;
 

@@ -1,5 +1,5 @@
-//! *searching*: viewpoints, looks, doubts and how much of them a look settles, and pushing
-//! obstacles aside.
+//! *searching*: viewpoints, views of surfaces, the doubt about objects and how much of it a view
+//! settles, and pushing obstacles aside.
 
 mod calls;
 mod facts;
@@ -21,8 +21,9 @@ use crate::note::Note;
 use crate::range::Referent;
 use crate::situation::Situation;
 
-/// Types of what is looked for, and of what that stands on.
+/// PDDL type of sought objects.
 const THING: &str = "thing";
+/// PDDL type of the surfaces that objects stand on.
 const SURFACE: &str = "surface";
 
 /// The ability *searching*.
@@ -86,14 +87,15 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// Things that nobody asked for, and things and surfaces that nobody has seen.
+/// Objects beyond those of the problem: seen ones that nobody asked for, an unseen thing and, for a body
+/// without a map, an unseen surface.
 fn others(s: &Situation) -> Vec<(&'static str, Referent<'_>)> {
     let seen = s.strangers().map(|track| (THING, Referent::Seen(track)));
     let unmapped = s.robot.surfaces().is_empty().then_some((SURFACE, Referent::Unseen));
     seen.chain([(THING, Referent::Unseen)]).chain(unmapped).collect()
 }
 
-/// Handles a finished look: records the view and updates the belief from all views of the surface.
+/// Handles a view of a surface: records it and updates the belief from all views of that surface.
 fn seen(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -139,8 +141,8 @@ fn pushed(
     Ok(format!("the hand moved {:.2} m with it", pushed.moved_m))
 }
 
-/// Handles a failed push: an object may have moved nevertheless, and the same push is not tried
-/// again.
+/// Handles a failed push: the object may have moved nevertheless, and the same push is not tried again
+/// from there.
 fn push_failed(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -158,7 +160,7 @@ fn push_failed(
     Ok(Some(format!("{} is not pushed from there again", arguments[1])))
 }
 
-/// Expected gain of a look, in words.
+/// Clause on the doubt that a view from a candidate would settle.
 fn hope(s: &Situation, from: usize, on: usize) -> String {
     let own = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
     let own = own.map(|(what, t)| (the(&t.name), s.doubt_about(what)));

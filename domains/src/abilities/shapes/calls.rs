@@ -10,7 +10,7 @@ use crate::situation::{Situation, holding};
 
 const SCANS: &[Reads] = &[Reads::all("scanned")];
 
-/// Every call.
+/// All calls of *shapes*.
 pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "circle-cost",
@@ -66,8 +66,8 @@ fn circle_cost(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(way.map_or(f64::INFINITY, |way| poses::seconds(s, from, &way))))
 }
 
-/// `[can-scan]`: an object is scanned from the poses around it; the nearest object first from the
-/// current pose.
+/// Answers `[can-scan ?from ?what]`: an object is scanned from the poses around it; before the first
+/// sweep, from the current pose alone.
 fn can_scan(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let pose = argument(call, 0)?;
     Ok(Answer::Truth(match named(s, call, 1)? {
@@ -76,7 +76,8 @@ fn can_scan(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     }))
 }
 
-/// Indices of the poses around a thing from which the plan scans before a call.
+/// Indices, in the object's ring, of the poses not swept from yet from which the plan scans before a
+/// call.
 fn planned(s: &Situation, call: &Call, thing: &FloorThing) -> Vec<usize> {
     let taken = |pose: &str| s.floor().sweeps.iter().any(|(_, from)| from == pose);
     let poses = holding(call, "scanned").filter_map(|r| r.arguments.first());
@@ -102,7 +103,7 @@ fn expected_sureness(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(hope(s, call, thing)))
 }
 
-/// Expected confidence in a thing after the scans of a plan.
+/// Expected gain of confidence in the shape of an object by the plan's scans before a call.
 fn hope(s: &Situation, call: &Call, thing: &FloorThing) -> f64 {
     let (known, scans) = (s.floor().known.len(), planned(s, call, thing));
     if scans.is_empty() && thing.taken_for.is_some() {
@@ -135,10 +136,12 @@ fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(if passes { 1.0 } else { 0.0 }))
 }
 
-/// Minimum expected reduction of an outline's looseness that justifies a scan, metres.
+/// Minimum expected reduction of an outline's looseness (how far the object may reach beyond it) that
+/// justifies a scan, metres.
 const WORTH_M: f64 = 0.001;
 
-/// Fallback: the quickest single scan or alignment with an expected gain.
+/// Fallback when the planner finds no plan: aligning the scans of an object; if there are none to align,
+/// each useful scan or survey, quickest first.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let sought = &s.floor().sought;
     // What nobody has learned is known by no scan.
@@ -180,7 +183,7 @@ pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     quickest_first(scans.chain(surveys).map(deeds).collect())
 }
 
-/// Reason for a scan from a pose.
+/// Clause on what a scan of an object from a pose would show.
 pub(super) fn hope_of_scan(s: &Situation, arguments: &[&str]) -> String {
     let Ok(Some(thing)) = thing(s, arguments[1]) else {
         return format!("nothing is known yet of what {THIS} is");

@@ -1,4 +1,4 @@
-//! The words that *shapes* states.
+//! Predicates and functions whose values *shapes* states.
 
 use super::floor::{FloorThing, NOTHING_KNOWN_M, THIS};
 use crate::ability::Fact;
@@ -6,7 +6,7 @@ use crate::range::{Range, Referent};
 use crate::situation::Situation;
 use crate::symbol::symbol;
 
-/// Every fact.
+/// All facts of *shapes*.
 pub(super) const ALL: &[Fact] = &[
     Fact {
         name: "around",
@@ -124,7 +124,7 @@ fn found(s: &Situation) -> Vec<String> {
     s.floor().names.iter().map(|(name, _)| line(name)).collect()
 }
 
-/// The thing on the floor that a referent denotes, if it was found.
+/// Object on the floor that a referent denotes, if it was found.
 fn thing_of<'a>(s: &'a Situation, of: Option<&Referent<'_>>) -> Option<&'a FloorThing> {
     match of {
         Some(Referent::Named(name)) => s.floor().thing(name),
@@ -132,19 +132,19 @@ fn thing_of<'a>(s: &'a Situation, of: Option<&Referent<'_>>) -> Option<&'a Floor
     }
 }
 
-/// Bounds on the looseness: scans lessen it.
+/// Bounds on an object's looseness, metres: further scans can only lessen it.
 fn looseness_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let now_m = thing_of(s, of.first()).map_or(NOTHING_KNOWN_M, FloorThing::looseness_m);
     Range { believed: now_m, least: 0.0, greatest: now_m }
 }
 
-/// Bounds on the certainty of what a thing is.
+/// Bounds on the certainty of what shape an object has.
 fn sureness_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let sure = |t: &FloorThing| Range::certainty(t.sureness(s.floor().known.len()), s.threshold);
     thing_of(s, of.first()).map_or(Range::UNKNOWN, sure)
 }
 
-/// Bounds on the truth: before all scans of a thing are brought together, it may be of any shape.
+/// Bounds on the truth of `(may-be ?spot ?shape)`: unknown before all scans of the object are aligned.
 fn may_be_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [spot, Referent::Named(shape)] = of else { return Range::UNKNOWN };
     let names = thing_of(s, Some(spot)).and_then(FloorThing::may_be);
@@ -152,7 +152,7 @@ fn may_be_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     names.map_or(Range::UNKNOWN, |names| Range::exactly(f64::from(u8::from(fits(names)))))
 }
 
-/// Bounds on the certainty. It is zero for a shape that nothing on the floor has.
+/// Bounds on the certainty that something on the floor has a shape; zero if nothing can have it.
 fn found_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(shape)] = of else { return Range::UNKNOWN };
     let sure = Range::certainty(s.floor().surest(shape), s.threshold);

@@ -13,18 +13,20 @@ use crate::situation::Situation;
 use crate::states::state;
 use crate::symbol::symbol;
 
-/// Symbol of the object nearest before the body at its first scan.
+/// Symbol of the first object found on the floor, the one nearest to the body at its first sweep.
 pub const THIS: &str = "this";
-/// Looseness of a shape without any scans, metres.
+/// Looseness (mean distance that an object may reach beyond its outline) of an object without scans,
+/// metres.
 pub const NOTHING_KNOWN_M: f64 = 1.0;
 /// Prior probability that an object is of no known shape.
 const STRANGER: f64 = 0.5;
-/// Probability that the scans of a known shape fit no model, by looseness of the outline (metres):
-/// 1 of 210 measured with closed outlines, see `experiments/measure/src/shapes`. Open outlines
-/// constrain scans less and are scanned once more before they are called unknown.
+/// Probability that the scans of a known shape fit no model, each with the looseness in metres below
+/// which it applies: 1 of 210 measured with closed outlines, see `experiments/measure/src/shapes`. Open
+/// outlines constrain scans less and are scanned once more before they are called unknown.
 const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
-/// Probability that a stranger is taken for one of five known shapes, by looseness of the outline
-/// (metres): measured with 210 strangers, scanned until that looseness or until one shape was left.
+/// Probability that an object of no known shape fits one of five known shapes, each with the looseness
+/// in metres below which it applies: measured with 210 objects, scanned until that looseness or until
+/// one shape was left.
 const TAKEN_FOR_KNOWN: [(f64, f64); 4] = [(0.01, 0.07), (0.02, 0.10), (0.16, 0.16), (f64::INFINITY, 0.60)];
 /// Number of known shapes in that measurement.
 const MEASURED_WITH: f64 = 5.0;
@@ -36,21 +38,21 @@ pub struct Floor {
     pub known: Vec<KnownShape>,
     /// Shapes learned in this run.
     pub learned: Vec<KnownShape>,
-    /// Objects that were found.
+    /// Objects found on the floor.
     pub things: Vec<FloorThing>,
-    /// Time and pose symbol of each sweep.
+    /// Time of each sweep, nanoseconds, with the symbol of its pose.
     pub sweeps: Vec<(i64, String)>,
-    /// Records of the sweeps.
+    /// Ids of the recorded sweeps.
     pub records: Vec<descry_memory::RecordId>,
     /// Floor that no sweep has passed over.
     pub unseen: UnseenFloor,
     /// Symbols of the requested shapes; empty: the goal is about [`THIS`].
     pub sought: Vec<String>,
-    /// Spoken names of shapes, by symbol.
+    /// Symbol and spoken name of each shape.
     pub names: Vec<(String, String)>,
-    /// Unobserved places where an object of a sought shape may stand.
+    /// Centres of unobserved discs on which an object of a sought shape may stand, map frame.
     pub room: Vec<Point2<f64>>,
-    /// Viewpoints of some of these places.
+    /// Symbols of the poses from which a sweep would pass over one of the places in `room`.
     pub promising: BTreeSet<String>,
     /// Number and distance of the viewpoints placed around a floor object.
     pub poses: Candidates,
@@ -61,13 +63,13 @@ pub struct Floor {
 pub struct FloorThing {
     /// PDDL symbol.
     pub symbol: String,
-    /// Approximate centre in the map.
+    /// Approximate centre, map frame.
     pub near: Point2<f64>,
     /// Scans that bound the object on both sides, in the map frame, each with its pose symbol.
     pub scans: Vec<(String, PosedScan)>,
     /// Unusable scans, each with its pose symbol and the reason.
     pub ignored: Vec<(String, Ignored)>,
-    /// Viewpoints around the object.
+    /// Symbols of the viewpoints around the object, in order.
     pub ring: Vec<String>,
     /// Joint outline of the scans; `None` before alignment.
     pub outline: Option<Arc<Outline>>,
@@ -94,7 +96,7 @@ impl Floor {
         self.known.iter().any(|k| symbol(&k.name) == shape)
     }
 
-    /// True if something may stand on the floor that no sweep has met.
+    /// True if an object that no sweep has met may stand on the floor.
     pub fn may_hide_more(&self) -> bool {
         self.sweeps.is_empty() || self.sought.is_empty() || !self.room.is_empty()
     }
@@ -125,8 +127,8 @@ impl FloorThing {
         self.outline.as_ref().map_or(NOTHING_KNOWN_M, known)
     }
 
-    /// Looseness expected after scans from further viewpoints, metres; none remains open after all
-    /// of them.
+    /// Looseness expected after scans from the viewpoints `more` (indices in `ring`), metres; 0 after
+    /// all of them.
     pub fn hoped_looseness_m(&self, more: &[usize]) -> f64 {
         let Some(outlook) = self.outline.as_ref().map(|o| &o.outlook) else { return NOTHING_KNOWN_M };
         let all: Vec<usize> = (0..self.ring.len()).collect();
@@ -135,7 +137,7 @@ impl FloorThing {
         self.looseness_m() * share
     }
 
-    /// Name of the only known shape that the object fits.
+    /// Name of the known shape that fits, if only one does.
     pub fn is(&self) -> Option<&str> {
         match &self.taken_for.as_ref()?.verdict {
             Verdict::Is(name) => Some(name),
@@ -143,13 +145,13 @@ impl FloorThing {
         }
     }
 
-    /// Names that the scans do not rule out; `None`: any.
+    /// Names of the shapes that the scans do not rule out; `None` before alignment: any.
     pub fn may_be(&self) -> Option<&[String]> {
         Some(&self.taken_for.as_ref()?.may_be)
     }
 
-    /// True if the object may be of a shape, given its scans; false if it surely is another shape
-    /// or none, or if this shape is ruled out.
+    /// True if the object may have a shape, given its scans and the number of `known` shapes; false if
+    /// it surely has another shape or none, or if this shape is ruled out.
     pub fn may_have(&self, shape: &str, known: usize, threshold: f64) -> bool {
         let is_sure = self.sureness(known) >= threshold;
         match self.taken_for.as_deref() {
@@ -160,7 +162,8 @@ impl FloorThing {
         }
     }
 
-    /// Confidence in the assigned shape, 0 to 1.
+    /// Confidence in the shape that alone fits, or in the object having no known shape, 0 to 1; 0 while
+    /// several fit.
     pub fn sureness(&self, known: usize) -> f64 {
         match self.taken_for.as_ref().map(|r| &r.verdict) {
             None | Some(Verdict::OneOf(_)) => 0.0,
@@ -172,35 +175,37 @@ impl FloorThing {
         }
     }
 
-    /// Maximum confidence reachable by scans from further viewpoints.
+    /// Maximum confidence reachable by scans from the viewpoints `more` (indices in `ring`).
     pub fn hoped(&self, more: &[usize], known: usize) -> f64 {
         self.hoped_of_name(more, known).max(self.sureness(known))
     }
 
-    /// Maximum confidence reachable by scans from further viewpoints, if the object fits one name
-    /// alone.
+    /// Confidence after scans from the viewpoints `more` (indices in `ring`), if one shape alone fits
+    /// then.
     pub fn hoped_of_name(&self, more: &[usize], known: usize) -> f64 {
         sure_of_name(self.hoped_looseness_m(more), known)
     }
 }
 
-/// Probability that an object is of the only shape that fits, among `known` shapes.
+/// Probability that an object has the only shape that fits, among `known` shapes, at a looseness in
+/// metres.
 fn sure_of_name(loose_m: f64, known: usize) -> f64 {
     let is = 1.0 - STRANGER;
     is / (is + by_chance(loose_m, known) * STRANGER)
 }
 
-/// Probability that a stranger fits one of `known` shapes by chance.
+/// Probability that an object of no known shape fits one of `known` shapes by chance.
 fn by_chance(loose_m: f64, known: usize) -> f64 {
     1.0 - (1.0 - up_to(&TAKEN_FOR_KNOWN, loose_m)).powf(known as f64 / MEASURED_WITH)
 }
 
-/// Value of the first bin that contains a looseness.
+/// Value of the first bin whose upper edge exceeds the looseness; 1 beyond the last.
 fn up_to(bins: &[(f64, f64)], loose_m: f64) -> f64 {
     bins.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share)
 }
 
-/// Floor object with a symbol.
+/// Floor object with a symbol; `None` for [`THIS`] before anything was found, an error for any other
+/// unknown symbol.
 pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a FloorThing>, String> {
     match s.floor().thing(name) {
         None if name != THIS => Err(format!("`{name}` is nothing that was found on the floor")),
@@ -226,13 +231,13 @@ pub(super) fn place(floor: &Floor, thing: &FloorThing) -> (Point2<f64>, f64) {
     }
 }
 
-/// The greatest distance between corners.
+/// Greatest distance between two corners, metres.
 pub(super) fn width_m(corners: &[Point2<f64>]) -> f64 {
     let apart = |a: &Point2<f64>| corners.iter().map(|b| (a - b).norm()).fold(0.0, f64::max);
     corners.iter().map(apart).fold(0.0, f64::max)
 }
 
-/// The least width of a convex outline.
+/// Least width of a convex outline, metres.
 pub(super) fn least_width_m(corners: &[Point2<f64>]) -> f64 {
     let n = corners.len();
     let across = |i: usize| {
@@ -245,12 +250,12 @@ pub(super) fn least_width_m(corners: &[Point2<f64>]) -> f64 {
 state!(Floor);
 
 impl Known {
-    /// The laser objects of the floor.
+    /// State of *shapes*: the objects found on the floor and the named shapes.
     pub(super) fn floor(&self) -> &Floor {
         self.states.get()
     }
 
-    /// Mutable access to the laser objects.
+    /// Mutable access to the state of *shapes*.
     pub(super) fn floor_mut(&mut self) -> &mut Floor {
         self.states.get_mut()
     }

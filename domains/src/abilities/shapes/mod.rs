@@ -119,10 +119,11 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// The type of names of shapes.
+/// PDDL type of shape names.
 const SHAPE: &str = "shape";
 
-/// Initial state of a run: the named shapes, and the requested ones.
+/// Sets the named shapes and the requested ones at the beginning of a run; for a search, also poses over
+/// the floor.
 fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     let robot = Arc::clone(&mind.known.robot);
     let remembered = mind.known.past.as_ref().map(|p| p.remembered.shapes.clone()).unwrap_or_default();
@@ -159,7 +160,7 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     };
 }
 
-/// Waypoints of the route around an object.
+/// Places along the route around an object.
 fn way(s: &Situation, arguments: &[&str]) -> Result<Vec<descry_robots::Place>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let to = s.candidate(arguments[1]).map_err(|e| e.to_string())?;
@@ -168,7 +169,7 @@ fn way(s: &Situation, arguments: &[&str]) -> Result<Vec<descry_robots::Place>, S
     Ok(way.into_iter().map(|n| s.candidates[n].place.clone()).collect())
 }
 
-/// Alignment task over all scans of an object.
+/// Alignment task over all scans of an object; an error if there are none.
 fn aligning(s: &Situation, name: &str) -> Result<Align, String> {
     let thing = thing(s, name)?.filter(|t| !t.scans.is_empty());
     let thing = thing.ok_or_else(|| format!("no scan shows both ends of {name}"))?;
@@ -179,7 +180,7 @@ fn aligning(s: &Situation, name: &str) -> Result<Align, String> {
     })
 }
 
-/// The laser has swept.
+/// Handles a laser sweep: updates the objects on the floor.
 fn scanned(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -193,7 +194,7 @@ fn scanned(
     Ok(String::new())
 }
 
-/// Handles an alignment: updates the recognition result.
+/// Handles an alignment: updates the recognition result; returns a sentence.
 fn aligned(
     mind: &mut Mind,
     _: Eyes<'_>,
@@ -225,7 +226,7 @@ fn aligned(
     Ok(format!("{said}: {} sure{contradict}", percent(thing.sureness(known))))
 }
 
-/// Outcome of learning: the aligned shape, stored under a name.
+/// Handles learning: stores the aligned shape under a name; returns a sentence.
 fn learned(
     mind: &mut Mind,
     eyes: Eyes<'_>,

@@ -29,7 +29,8 @@ pub(super) fn around(
     mind.known.candidates[first..].iter().map(|c| c.symbol.clone()).collect()
 }
 
-/// Adds poses over the floor, each in two opposite headings.
+/// Adds reachable poses all over the mapped floor to the candidates, each place in two opposite
+/// headings.
 pub(super) fn survey(mind: &mut Mind, robot: &dyn Robot) {
     let Some(map) = robot.map() else { return };
     let from = mind.known.candidates[mind.known.at].place.clone();
@@ -94,7 +95,7 @@ pub(super) fn seconds(s: &Situation, from: usize, way: &[usize]) -> f64 {
 /// Minimum distance of a straight drive from the object's centre, metres.
 const CLEAR_M: f64 = 0.9;
 
-/// True if the straight line between two poses stays clear of a place.
+/// True if the straight line between two candidates stays [`CLEAR_M`] away from a point.
 fn beside(s: &Situation, a: usize, b: usize, middle: &Point2<f64>) -> bool {
     let Some((a, b)) = point(s, a).zip(point(s, b)) else { return false };
     let along = b - a;
@@ -102,7 +103,7 @@ fn beside(s: &Situation, a: usize, b: usize, middle: &Point2<f64>) -> bool {
     (middle - (a + along * t.clamp(0.0, 1.0))).norm() >= CLEAR_M
 }
 
-/// Position of a candidate on the floor.
+/// Floor position of a candidate; `None` for a station.
 pub(super) fn point(s: &Situation, candidate: usize) -> Option<Point2<f64>> {
     match &s.candidates[candidate].place {
         Place::Pose(pose) => Some(pose.point()),

@@ -26,14 +26,16 @@ use crate::symbol::symbol;
 /// Minimum distance of a reading in front of the mapped obstacle to belong to an object, metres;
 /// twice the localisation error is added.
 const BEFORE_MAP_M: f64 = 0.1;
-/// Maximum distance, metres, and minimum number of readings, of an object in a usable scan.
+/// Maximum distance of an object from the laser in a usable scan, metres.
 const NEAR_M: f64 = 3.0;
+/// Minimum number of readings of an object in a usable scan.
 const LEAST_READINGS: usize = 5;
-/// Maximum distance of readings from the believed outline of an object to belong to it, metres.
+/// Maximum distance of a cluster of readings from the believed outline of the object that it belongs to,
+/// metres.
 const SAME_M: f64 = 0.5;
 /// Half width assumed for an object with few readings, metres.
 const USUAL_RADIUS_M: f64 = 0.2;
-/// Error length beyond which scans contradict each other, metres: twice the laser's precision.
+/// Alignment error beyond which scans contradict each other, metres: twice the laser's precision.
 pub(super) const LONGEST_M: f64 = 0.02;
 
 /// Options for aligning scans, from the body's localisation accuracy.
@@ -109,7 +111,7 @@ fn remember(mind: &mut Mind, eyes: Eyes<'_>, from: &str, scanned: &Scanned) -> R
     Ok(record.scan_at(scanned.stamp_ns, &body.frames.map)?)
 }
 
-/// Occupancy map in the type of perception; everything outside is occupied.
+/// Occupancy map in the type that perception uses, with a border of occupied cells added.
 fn occupancy(grid: &OccupancyGrid) -> Occupancy {
     let width = grid.width + 2;
     let taken = |row: usize, column: usize| {
@@ -131,7 +133,7 @@ fn nearest_first(mut clusters: Vec<Cluster>, laser: &Vector2<f64>) -> Vec<Cluste
     clusters
 }
 
-/// Object that a cluster of readings belongs to: an earlier detection, or a new one.
+/// Index of the object that a cluster of readings belongs to: one detected earlier, or else a new one.
 fn assign(floor: &mut Floor, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
     let off_m = |t: &FloorThing| {
         let (middle, width_m) = place(floor, t);
@@ -155,7 +157,7 @@ fn assign(floor: &mut Floor, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
     number - 1
 }
 
-/// Adds viewpoints around an object if requested and not yet done; true if added.
+/// Adds viewpoints around an object that the goal is about, unless it has some; true if added.
 fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
     let thing = &mind.known.floor().things[index];
     let is_asked = !mind.known.floor().sought.is_empty() || thing.symbol == THIS;
@@ -168,7 +170,8 @@ fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
     true
 }
 
-/// Aligns the scans of an object, and computes the expected gain of further scans.
+/// Aligns the scans of an object, and computes the expected gain of further scans; without alignment,
+/// nothing changes.
 fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
     let thing = &mind.known.floor().things[index];
     let scans: Vec<_> = thing.scans.iter().map(|(_, posed)| posed.clone()).collect();
@@ -190,7 +193,7 @@ fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
     thing.outline = Some(Arc::new(Outline { alignment, outlook }));
 }
 
-/// Recognition of a shape.
+/// Recognises the shape of aligned scans; scans that contradict each other rule out no known shape.
 pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> Recognition {
     let options = RecogniseOptions {
         fit: FitOptions { solver: solver(s.robot.description()), ..FitOptions::default() },
@@ -205,7 +208,7 @@ pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> R
     recognise_scans(&alignment.model, loose_m, &s.floor().known, &options)
 }
 
-/// Clause about scans that contradict the others.
+/// Clause on scans, and ends of scans, that contradict the others; empty if none do.
 pub(super) fn contradict(alignment: &Alignment) -> String {
     let scans = match alignment.left_out.len() {
         0 => String::new(),
@@ -218,7 +221,8 @@ pub(super) fn contradict(alignment: &Alignment) -> String {
     scans + &ends
 }
 
-/// Updates the unobserved floor, and the poses to look at it.
+/// Updates the unobserved floor, the room left there for a sought shape, and the poses that would show
+/// that room.
 fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
     let reach_m = eyes.robot.description().laser.as_ref().map_or(0.0, |laser| laser.reach_m);
     let known = &mut mind.known;
@@ -243,7 +247,8 @@ fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
 }
 
 impl Floor {
-    /// Radius of the largest disc inside the smallest sought shape, slightly reduced for its uncertainty.
+    /// Radius of the largest disc inside the smallest sought shape, metres, slightly reduced for its
+    /// uncertainty; `None` if no sought shape is known.
     fn sought_radius_m(&self) -> Option<f64> {
         let of = self.known.iter().filter(|k| self.sought.contains(&symbol(&k.name)));
         let least = of.map(|k| least_width_m(&k.model.hull().corners)).reduce(f64::min)?;

@@ -57,7 +57,7 @@ impl<'a> Teller<'a> {
         known.unwrap_or_else(|| shape.into())
     }
 
-    /// Reason the run ended before the shape was sure.
+    /// Verdict and reason if a limit, a failure or the deadline ended the run; `None` otherwise.
     fn cut(&self, ended: &Ended) -> Option<(Verdict, String)> {
         match ended {
             Ended::Limit(why) => Some((Verdict::CannotTell, why.clone())),
@@ -183,7 +183,8 @@ impl<'a> Teller<'a> {
         format!("at ({:.2}, {:.2}) m", middle.x, middle.y)
     }
 
-    /// Numbers of used and failed scans behind a shape, in words.
+    /// Clauses on the used scans of an object, those left out, poses that could not be reached, and the
+    /// open outline.
     fn scans(&self, thing: &FloorThing) -> String {
         let used = thing.outline.as_ref().map_or(0, |o| o.alignment.model.scans().len());
         let mut parts = vec![format!("from {used} scans")];

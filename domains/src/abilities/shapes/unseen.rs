@@ -4,26 +4,26 @@ use descry_perception::laser::Scan;
 use descry_perception::nalgebra::{Point2, Vector2};
 use descry_robots::OccupancyGrid;
 
-/// Distance before a reading's end beyond which the ray no longer proves free floor, metres.
+/// Length at the end of a ray that does not count as free floor, metres.
 const BEFORE_M: f64 = 0.05;
-/// Maximum number of possible places whose visibility is tested.
+/// Maximum number of points whose visibility from a pose is tested.
 const ASKED: usize = 200;
 
 /// Floor not covered by any sweep.
 #[derive(Clone, Default)]
 pub struct UnseenFloor {
     grid: Option<OccupancyGrid>,
-    /// True, by cell, if mapped as free and not yet covered.
+    /// For each cell, true if the map shows it free and no sweep has covered it.
     open: Vec<bool>,
 }
 
 impl UnseenFloor {
-    /// All of the floor that the map has free.
+    /// Unseen floor before any sweep: all that the map shows as free.
     pub fn of(map: &OccupancyGrid) -> Self {
         UnseenFloor { open: map.occupied.iter().map(|taken| !taken).collect(), grid: Some(map.clone()) }
     }
 
-    /// Marks the floor that a sweep passed over.
+    /// Marks the floor that a sweep passed over, up to `reach_m` metres.
     pub fn pass(&mut self, scan: &Scan, reach_m: f64) {
         let Some(grid) = &self.grid else { return };
         let from = scan.map_from_laser.translation.vector;
@@ -50,7 +50,8 @@ impl UnseenFloor {
         }
     }
 
-    /// Centres of uncovered discs of a radius on which an object may stand.
+    /// Centres of the discs of this radius (metres) that no sweep has touched, so that an object may
+    /// stand there.
     pub fn room_for(&self, radius_m: f64) -> Vec<Point2<f64>> {
         let Some(grid) = &self.grid else { return Vec::new() };
         let reach = (radius_m / grid.resolution_m).floor() as isize;
@@ -72,8 +73,8 @@ impl UnseenFloor {
             .collect()
     }
 
-    /// True if a half-circle sweep from a place and heading would pass over any of the points,
-    /// given map and known objects.
+    /// True if a half-circle sweep from a place and heading would pass over one of the points `middles`,
+    /// given the map and the objects `discs` (centre and radius).
     pub fn would_pass(
         &self,
         from: &Point2<f64>,

@@ -9,7 +9,7 @@ use crate::ability::{Deed, Meaning, Reads, argument, best_first};
 use crate::looking::looks;
 use crate::situation::{Situation, holding};
 
-/// Every call.
+/// All calls of *surveying*.
 pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "expected-view",
@@ -38,14 +38,14 @@ fn expected_view(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     gain_m2(s, call).map(Answer::Number)
 }
 
-/// Expected gain of confidence from the newly visible floor: its share of all unknown visible
-/// floor, scaled to half of what confidence lacks.
+/// Expected gain of confidence in a thing from floor that a view would newly show: the confidence that
+/// is missing, times that floor's share of all unknown visible floor.
 fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let what = s.thing(argument(call, 1)?)?;
     Ok(Answer::Number((1.0 - s.confidence(what)) * share_shown(s, call)?))
 }
 
-/// Expected gain of completeness for a kind.
+/// Expected gain of completeness of a kind from floor that a view would newly show.
 fn expected_discoveries(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let of = s.kind(argument(call, 1)?)?;
     Ok(Answer::Number((1.0 - s.completeness(of)) * share_shown(s, call)?))
@@ -69,7 +69,7 @@ fn gain_m2(s: &Situation, call: &Call) -> Result<f64, CallError> {
     Ok(unseen.gain_m2(look))
 }
 
-/// Reason for a look from a pose.
+/// Clause on the unknown floor that a view from a pose would show.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     match s.chart().outlook(arguments[0]) {
         Some(look) => format!(
@@ -81,7 +81,8 @@ pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     }
 }
 
-/// Fallback: the look with the most unknown floor per second if any, else a look at a surface.
+/// Fallback when the planner finds no plan: mapping views, those with the most unknown floor per second
+/// first; if there are none, views of surfaces.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let rate = |(symbol, look): &(String, descry_perception::mapping::Outlook)| {
         let to = s.candidate(symbol).ok().filter(|to| s.can_drive_to(*to))?;

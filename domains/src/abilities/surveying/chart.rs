@@ -33,52 +33,53 @@ const CELL_M: f64 = 0.1;
 const FAR_M: f64 = 5.0;
 /// Height range of obstacles to the body, metres.
 pub(super) const BODY_M: std::ops::RangeInclusive<f64> = 0.15..=1.6;
-/// Height range of supporting surfaces, metres; the next constant is their minimum area, square
-/// metres.
+/// Height range of supporting surfaces, metres.
 const SURFACE_M: std::ops::RangeInclusive<f64> = 0.3..=1.4;
+/// Minimum area of supporting surfaces, square metres.
 const SURFACE_M2: f64 = 0.15;
 /// Clearance between the footprint and mapped obstacles, metres: half a cell, plus the pose error.
 const CLEAR_M: f64 = 0.08;
 /// Number of exploration poses offered to the planner.
 const WEIGHED: usize = 7;
-/// Duration of a look, seconds.
+/// Assumed duration of a view, seconds.
 pub(super) const LOOK_S: f64 = 2.0;
-/// Floor that counts as unknown before the first look, square metres.
+/// Area of floor that counts as unknown before the first view, square metres.
 pub(super) const NOTHING_SEEN_M2: f64 = 100.0;
 /// Maximum height difference of overlapping level surfaces that count as one, metres.
 const SAME_HEIGHT_M: f64 = 0.08;
 
-/// Map under construction by the body.
+/// Map under construction by a body without a map.
 #[derive(Clone, Default)]
 pub struct Chart {
     survey: Option<Survey>,
-    /// Poses of the looks of this run and earlier ones, aligned with the map, in the frame of the
-    /// first look.
+    /// Poses of the body at the views of this run and earlier ones, optimised, in the chart's frame:
+    /// that of the first view.
     pub(super) stood: Vec<Isometry2<f64>>,
-    /// Poses at which the body believed to be for these looks, in its own map.
+    /// Poses at the same views as localisation stated them, in the map frame of the body.
     pub(super) believed: Vec<Isometry2<f64>>,
-    /// Transform from the chart to the body's own map: the body's heading was some degrees off at the first
-    /// look.
+    /// Transform from the chart's frame to the map frame of the body: the heading was some degrees off
+    /// at the first view.
     pub(super) map_from_chart: Isometry2<f64>,
-    /// Walls, surfaces and open floor, once something was seen.
+    /// Walls, surfaces and open floor; `None` before the first view.
     pub(super) map: Option<Arc<RoomMap>>,
-    /// Routes with clearance, and routes without it for places that are unreachable otherwise.
+    /// Routes with clearance; `None` before the first view.
     router: Option<Arc<Router>>,
+    /// Routes without clearance, for places that are unreachable otherwise.
     narrow: Option<Arc<Router>>,
     /// Passability of floor as learned from drives.
     pub(super) ground: Ground,
-    /// Exploration poses with their symbols.
+    /// Exploration poses, each with its symbol and what is expected to be seen from there.
     pub(super) open: Vec<(String, Outlook)>,
     /// Unknown floor visible only from places that became unreachable through failed drives, square
     /// metres.
     cut_off_m2: f64,
-    /// Level supporting surfaces: names and observations.
+    /// Level supporting surfaces, each with its name.
     pub(super) surfaces: Vec<(String, Level)>,
     /// Number of pose symbols assigned so far.
     given: usize,
-    /// Viewpoints of surfaces.
+    /// Number and distance of the viewpoints placed around a surface.
     pub(super) poses: Candidates,
-    /// Records that the map is built from.
+    /// Ids of the recorded views that the map is built from.
     pub(super) records: Vec<RecordId>,
 }
 
@@ -110,7 +111,7 @@ impl Chart {
         Some(kept)
     }
 
-    /// Accumulated survey.
+    /// Accumulated survey, begun if there is none.
     pub(super) fn survey(&mut self) -> Result<&mut Survey, String> {
         if self.survey.is_none() {
             self.survey = Some(Survey::new(CELL_M).map_err(|e| e.to_string())?);
@@ -118,8 +119,8 @@ impl Chart {
         self.survey.as_mut().ok_or_else(|| "nothing was seen".into())
     }
 
-    /// Aligns the optimised poses with the believed ones as a whole, so that the believed poses'
-    /// errors average out.
+    /// Sets `map_from_chart` by aligning the optimised poses as a whole with the stated ones, so that
+    /// the errors of the stated ones average out.
     fn settle(&mut self) {
         let pairs = || self.believed.iter().zip(&self.stood);
         let count = self.stood.len().min(self.believed.len()).max(1) as f64;
@@ -157,7 +158,7 @@ impl Chart {
         (self.router, self.narrow) = (over(&footing.stand), over(&footing.pass));
     }
 
-    /// Positions that the body's centre may take, in the body's own map.
+    /// Positions that the body's centre may take without clearance, in the map frame of the body.
     pub(super) fn passable(&self) -> Vec<Point2<f64>> {
         let Some(router) = &self.narrow else { return Vec::new() };
         let free = router.map();
@@ -231,14 +232,15 @@ impl Chart {
         self.footing(body).map(|(floor, _)| floor)
     }
 
-    /// Occupancy of the floor, and the free positions of the body's centre.
+    /// Occupancy of the floor, and the free positions of the body's centre; `None` before the first
+    /// view.
     fn footing(&self, body: &Description) -> Option<(Occupancy, Footing)> {
         let mut floor = self.map.as_ref()?.floor(&self.stood, body.radius_m() + CELL_M, *BODY_M.end())?;
         let footing = self.ground.open(&mut floor, (body.radius_m(), CLEAR_M), &self.map_from_chart);
         Some((floor, footing))
     }
 
-    /// Exploration poses as candidates.
+    /// Exploration poses as candidates, in the map frame of the body.
     pub(super) fn poses(&self) -> impl Iterator<Item = Candidate> + '_ {
         self.open.iter().map(|(symbol, look)| {
             let at = self.map_from_chart * look.pose;
@@ -247,7 +249,7 @@ impl Chart {
         })
     }
 
-    /// The outlook of a symbol.
+    /// What is expected to be seen from the exploration pose with a symbol.
     pub(super) fn outlook(&self, symbol: &str) -> Option<&Outlook> {
         self.open.iter().find(|(name, _)| name == symbol).map(|(_, look)| look)
     }
@@ -274,14 +276,14 @@ impl Chart {
         })
     }
 
-    /// Routes without clearance, up to where clearance begins.
+    /// Routes without clearance; `None` if the destination itself has no clearance.
     fn narrow_to(&self, to: &Pose2) -> Option<&Router> {
         let fits = self.router.as_ref().is_some_and(|router| router.fits(&to.point()).is_ok());
         self.narrow.as_deref().filter(|_| fits)
     }
 }
 
-/// A pose in another frame.
+/// Pose transformed into another frame.
 fn put(other_from_here: &Isometry2<f64>, pose: &Pose2) -> Pose2 {
     let at = other_from_here * pose.point();
     Pose2::new(at.x, at.y, pose.yaw_rad + other_from_here.rotation.angle())
@@ -308,7 +310,7 @@ fn is_one(a: &Level, b: &Level) -> bool {
     (a.height_m - b.height_m).abs() < SAME_HEIGHT_M && (holds(a, &middle(b)) || holds(b, &middle(a)))
 }
 
-/// Grid whose free cells are the positions of the body's centre.
+/// Grid whose free cells are those in which the body's centre may be (`stand`).
 fn grid(floor: &Occupancy, stand: &[bool]) -> OccupancyGrid {
     let width = floor.width.max(1);
     OccupancyGrid {
@@ -320,7 +322,7 @@ fn grid(floor: &Occupancy, stand: &[bool]) -> OccupancyGrid {
     }
 }
 
-/// Field of view of the camera on the floor plan.
+/// Horizontal field of view and range of the camera.
 fn field(camera: &Camera) -> FieldOfView {
     let c = &camera.intrinsics;
     FieldOfView {
@@ -331,7 +333,7 @@ fn field(camera: &Camera) -> FieldOfView {
     }
 }
 
-/// The farthest depth that is used, metres.
+/// Maximum depth of the camera that is used for the map, metres.
 pub(super) fn far_m(camera: &Camera) -> f64 {
     camera.range_m.1.min(FAR_M)
 }
@@ -363,7 +365,7 @@ pub(super) fn rectify(body: &Description, camera: &Camera) -> RectifyOptions {
 state!(Arc<Chart>);
 
 impl Known {
-    /// Map of the body's own making.
+    /// State of *surveying*: the map of the body's own making.
     pub(super) fn chart(&self) -> &Chart {
         self.states.get::<Arc<Chart>>()
     }
@@ -472,7 +474,7 @@ impl OwnMap for Chart {
     }
 }
 
-/// Initial map of a run.
+/// Sets the initial map of a run, and returns it as the body's own map.
 pub(super) fn recall(
     domain: &Domain,
     past: Option<&Past>,

@@ -1,9 +1,9 @@
-//! The words that *surveying* states.
+//! Predicates and functions whose values *surveying* states.
 
 use crate::ability::Fact;
 use crate::situation::Situation;
 
-/// Every fact.
+/// All facts of *surveying*.
 pub(super) const ALL: &[Fact] = &[
     Fact {
         name: "outlook",

@@ -1,8 +1,8 @@
-//! Floor knowledge from drives: visited places are passable, and places where a drive failed are
-//! not tried again.
+//! Floor knowledge from drives: visited places are passable, and places where a drive failed are not
+//! tried again.
 //!
-//! Both are in the body's own map. It errs there by centimetres, as the map that is read from looks does: at corners that are passed closely no
-//! margin is enough.
+//! Both are kept in the map frame of the body. Localisation errs by centimetres there, and so does the
+//! map read from views: at corners that are passed closely no margin is enough.
 
 use descry_memory::remember::Surveyed;
 use descry_perception::mapping::{ExploreOptions, Reach, standable};
@@ -16,8 +16,8 @@ use crate::mind::Mind;
 use crate::own_map::OwnMap;
 use crate::situation::Situation;
 
-/// Radius around the body and the remaining route within which the body is asked for the floor
-/// after a failed drive, metres.
+/// Distance from the body and the remaining route within which the body is asked, after a failed drive,
+/// where it fits, metres.
 const ASKED_M: f64 = 0.8;
 /// Maximum distance of a cell's centre from a driven line for the cell to count as passed, cells.
 const PASSED: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -25,19 +25,21 @@ const PASSED: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Floor knowledge from drives.
 #[derive(Clone, Debug, Default)]
 pub struct Ground {
-    /// Straight lines that were driven.
+    /// Straight lines along which the body's centre drove, map frame.
     pub driven: Vec<[Point2<f64>; 2]>,
-    /// Places where the body does not fit by its own account, though looks show nothing there.
+    /// Places where the body reports that it does not fit, though views show nothing there; map frame.
     pub barred: Vec<Point2<f64>>,
 }
 
-/// True, by grid cell, if the body's centre may be there.
+/// Cells of the floor's grid in which the body's centre may be.
 pub struct Footing {
-    /// Passable by all that is known, with a margin.
+    /// For each cell, true if all knowledge allows the body there with clearance.
     pub stand: Vec<bool>,
-    /// Positions passable without the safety margin: used where no other route leads on.
+    /// For each cell, true if all knowledge allows the body there without clearance: used where no other
+    /// route leads on.
     pub pass: Vec<bool>,
-    /// Passable by looks and drives alone, without a margin.
+    /// For each cell, true if views and drives alone allow the body there, without clearance and without
+    /// regard to reports.
     pub shown: Vec<bool>,
 }
 
@@ -52,7 +54,7 @@ impl Footing {
         reach
     }
 
-    /// Reach of a body by looks and drives alone.
+    /// Positions with clearance that are reachable if the body's reports are ignored along the way.
     pub(super) fn reach_as_shown(
         &self,
         floor: &Occupancy,
@@ -62,7 +64,7 @@ impl Footing {
         self.reach_through(&self.shown, floor, from, options)
     }
 
-    /// Positions reachable across the given cells.
+    /// Positions with clearance that are reachable across the cells `over`.
     fn reach_through(
         &self,
         over: &[bool],
@@ -87,8 +89,8 @@ impl Ground {
         kept.barred.clone_from(&self.barred);
     }
 
-    /// Opens the floor that was driven over, and returns where a body of this size with this
-    /// clearance may be, metres.
+    /// Marks the floor that was driven over as free, and returns where a body of this radius may be,
+    /// with and without this clearance, metres.
     pub fn open(
         &self,
         floor: &mut Occupancy,
@@ -118,12 +120,12 @@ impl Ground {
         Footing { stand, pass, shown }
     }
 
-    /// True if drives have found floor that only seems to be passable.
+    /// True if the body reported places where it does not fit though they seem to be passable.
     pub(super) fn is_barred(&self) -> bool {
         !self.barred.is_empty()
     }
 
-    /// Takes in a drive that has come as far as `to`.
+    /// Adds the part of a route that was driven, from its start to `to`, where the body stopped.
     pub fn drove(&mut self, from: &Place, way: &[Place], to: &Place) {
         let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return };
         let mut corners = vec![from.point()];
@@ -151,8 +153,8 @@ pub(super) fn has_driven(mind: &mut Mind, s: &Situation) {
     }
 }
 
-/// Handles a drive that ended early on the body's own map: opens the driven part, and bars places
-/// where the body reports not to fit. Returns the conclusion; empty without such a map or news.
+/// Handles a drive that ended early on the body's own map: opens the driven part, and bars places where
+/// the body reports not to fit. Returns a sentence; `None` without such a map or new barred places.
 pub(super) fn drive_failed(
     mind: &mut Mind,
     robot: &dyn Robot,
@@ -182,8 +184,8 @@ pub(super) fn drive_failed(
     })
 }
 
-/// Asks the body where it does not fit, around it and along its route; returns the number of new
-/// places.
+/// Asks the body at which of the positions `seem`, which seem passable, it does not fit, around it and
+/// along its route; bars them and returns their number.
 pub fn ask(
     ground: &mut Ground,
     seem: Vec<Point2<f64>>,
@@ -216,14 +218,14 @@ fn points(way: &[Place]) -> impl Iterator<Item = Point2<f64>> {
     })
 }
 
-/// Point of a segment nearest to a place.
+/// Point of a segment nearest to a point.
 pub fn nearest([a, b]: &[Point2<f64>; 2], p: &Point2<f64>) -> Point2<f64> {
     let along = b - a;
     let share = (p - a).dot(&along) / along.norm_squared();
     if share.is_finite() { a + along * share.clamp(0.0, 1.0) } else { *a }
 }
 
-/// Index of the cell at a place.
+/// Index of the cell that contains a point; `None` outside the grid.
 pub fn square(grid: &Occupancy, place: &Point2<f64>) -> Option<usize> {
     let at = ((place - grid.origin) / grid.cell_m).map(f64::floor);
     let rows = grid.cells.len() / grid.width.max(1);
@@ -231,7 +233,7 @@ pub fn square(grid: &Occupancy, place: &Point2<f64>) -> Option<usize> {
     inside.then(|| at.y as usize * grid.width + at.x as usize)
 }
 
-/// Cells that a body at a place covers.
+/// Indices of the cells that a line through a point passes, see [`PASSED`].
 fn passed(grid: &Occupancy, place: &Point2<f64>) -> impl Iterator<Item = usize> {
     let (grid, place) = (grid, *place);
     let around = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(f64::from(x), f64::from(y))));
@@ -241,7 +243,7 @@ fn passed(grid: &Occupancy, place: &Point2<f64>) -> impl Iterator<Item = usize> 
     })
 }
 
-/// Middle of a square.
+/// Centre of the cell with an index.
 pub fn middle(grid: &Occupancy, square: usize) -> Point2<f64> {
     let width = grid.width.max(1);
     let steps = Vector2::new((square % width) as f64 + 0.5, (square / width) as f64 + 0.5);

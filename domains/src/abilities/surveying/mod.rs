@@ -26,11 +26,11 @@ use crate::note::Note;
 use crate::objective::Goal;
 use crate::situation::Situation;
 
-/// Target of a mapping look, metres ahead and metres high, so that the floor near the body and
-/// walls up to a man's height are visible.
+/// Target of a mapping view, metres ahead and metres high, so that the floor near the body and walls up
+/// to a man's height are visible.
 const AHEAD_M: (f64, f64) = (3.0, 0.35);
 
-/// The skill that takes a look into the map.
+/// Skill that takes a view for the map.
 const CHART: &str = "chart";
 
 /// The ability *surveying*.
@@ -67,13 +67,13 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// Initial state of a run with a map from an earlier run: the part still unknown.
+/// Finds exploration poses at the beginning of a run with a map from an earlier run.
 fn begins(mind: &mut Mind, _: &Domain, _: &Goal) {
     let robot = Arc::clone(&mind.known.robot);
     taken::look_out(mind, &*robot, "");
 }
 
-/// Target point of a mapping look.
+/// Target point of a mapping view, map frame; `None` at a station.
 fn ahead(s: &Situation) -> Option<Point3<f64>> {
     let Place::Pose(pose) = &s.candidates[s.at].place else { return None };
     let (ahead_m, height_m) = AHEAD_M;
@@ -81,7 +81,7 @@ fn ahead(s: &Situation) -> Option<Point3<f64>> {
     Some(Point3::new(pose.x_m + ahead_m * cos, pose.y_m + ahead_m * sin, height_m))
 }
 
-/// Handles a mapping look.
+/// Handles a mapping view: adds it to the map.
 fn charted(
     mind: &mut Mind,
     eyes: Eyes<'_>,

@@ -9,8 +9,9 @@ use descry_robots::image::{ImageFormat, ImageResult, Rgb, RgbImage};
 
 use super::chart::Chart;
 
-/// Pixels a metre, and most pixels of a side.
+/// Pixels per metre.
 const SCALE: f64 = 40.0;
+/// Maximum number of pixels along a side.
 const MOST: f64 = 8000.0;
 const UNKNOWN: [u8; 3] = [255, 255, 255];
 const FREE: [u8; 3] = [220, 235, 247];
@@ -43,7 +44,7 @@ impl Canvas {
     }
 }
 
-/// The grid as the ground to draw on.
+/// Picture of the grid's cells, to draw on.
 fn ground(grid: &Occupancy) -> RgbImage {
     let cells = [grid.width, grid.cells.len() / grid.width.max(1)];
     let per_cell = SCALE * grid.cell_m;
@@ -58,10 +59,11 @@ fn ground(grid: &Occupancy) -> RgbImage {
     })
 }
 
-/// The bytes of a PNG.
+/// Draws the map as a PNG.
 ///
 /// # Errors
-/// If they cannot be written.
+///
+/// If the picture cannot be encoded.
 pub(super) fn png(chart: &Chart, map: &RoomMap) -> ImageResult<Vec<u8>> {
     let nothing = Occupancy { origin: Point2::origin(), cell_m: 1.0, width: 1, cells: vec![Space::Unknown] };
     let grid = map.grid.as_ref().unwrap_or(&nothing);

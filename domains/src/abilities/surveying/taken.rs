@@ -1,5 +1,5 @@
-//! Perception of a mapping look: recorded, read back by its timestamp, registered to earlier looks,
-//! and added to the map.
+//! Perception of a mapping view: recorded, read back by its timestamp, registered to earlier views, and
+//! added to the map.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ const MAP: &str = "map";
 /// metres.
 const MOVED_M: f64 = 0.15;
 
-/// Processes a look; look and updated map are in the record on return.
+/// Processes a mapping view; on return, the view and the updated map are recorded.
 pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed) -> Result<Note, WorldError> {
     let body = eyes.robot.description();
     let id = recording::view(mind, eyes, &[], sensed)?;
@@ -99,7 +99,8 @@ pub(super) fn look_out(mind: &mut Mind, robot: &dyn Robot, from: &str) {
     replace(mind, |symbol| symbol.starts_with("view-"), open);
 }
 
-/// Replaces poses; those of the body's current place and last look stay.
+/// Replaces the poses whose symbols satisfy `of`; those of the body's current place and of its last view
+/// stay.
 fn replace(mind: &mut Mind, of: impl Fn(&str) -> bool, by: Vec<Candidate>) {
     let known = &mut mind.known;
     let [at, looked_from] = [known.at, known.looked_from].map(|n| known.candidates[n].clone());

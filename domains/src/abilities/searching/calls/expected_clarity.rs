@@ -1,4 +1,4 @@
-//! `[expected-clarity ?from ?on]`: expected rise of a surface's clarity by a look.
+//! `[expected-clarity ?from ?on]`: expected rise of a surface's clarity by a view of it.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,6 +1,6 @@
-//! `[expected-completeness ?from ?on ?of]`: expected rise of the certainty that all objects of a
-//! kind are found. Zero for every look where the objects already seen from all sides limit that
-//! certainty.
+//! `[expected-completeness ?from ?on ?of]`: expected rise, by a view, of the certainty that all objects
+//! of a kind are found. Zero if objects already seen from all sides keep that certainty below what is
+//! required.
 
 use descry_planner::{Answer, Call, CallError};
 

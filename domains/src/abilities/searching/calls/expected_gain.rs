@@ -1,6 +1,6 @@
-//! `[expected-gain ?from ?on ?what]`: expected rise of the confidence in an object by a look, if
-//! the settled doubt turns out in the object's favour. Doubt settled by an earlier look of the plan
-//! does not count again.
+//! `[expected-gain ?from ?on ?what]`: expected rise of the confidence in an object by a view, if what
+//! the view settles turns out in the object's favour. Doubt settled by an earlier view of the plan does
+//! not count again.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,5 +1,5 @@
-//! `[expected-placing ?from ?on ?what]`: expected rise of the certainty of an object's position
-//! along its surface by a look. Edges shown by an earlier look of the plan do not count again.
+//! `[expected-placing ?from ?on ?what]`: expected rise, by a view, of the certainty of an object's
+//! position along its surface. Edges shown by an earlier view of the plan do not count again.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,5 +1,5 @@
-//! `[expected-presence ?from ?on ?what]`: expected rise of the certainty that an object stands on a
-//! surface by a look, if the settled doubt turns out in the object's favour.
+//! `[expected-presence ?from ?on ?what]`: expected rise, by a view, of the certainty that an object
+//! stands on a surface, if what the view settles turns out in the object's favour.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -17,12 +17,13 @@ use crate::ability::{Meaning, Reads, argument};
 use crate::belief::doubt::{Doubt, Taken};
 use crate::situation::Situation;
 
-/// Looks at the surface that the call names; all looks for a call without a surface.
+/// Read set: the `observed` facts of the surface that the call names; all of them for a call without a
+/// surface.
 const OBSERVED: Reads = Reads { word: "observed", of: &[None, Some("surface")] };
 const PUSHED: Reads = Reads::all("pushed");
 const LOOKS: &[Reads] = &[OBSERVED, PUSHED];
 
-/// Every call.
+/// All calls of *searching*.
 pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "can-see",
@@ -89,9 +90,9 @@ pub(super) const ALL: &[Meaning] = &[
     },
 ];
 
-/// Share of a doubt that a call's look settles beyond the earlier steps of the plan. The call's
-/// arguments are viewpoint and surface; without a surface (`names_surface`), looks at all surfaces
-/// count.
+/// Share of a doubt that the call's view settles beyond the earlier steps of the plan, 0 to 1. The
+/// call's arguments are viewpoint and surface; without a surface (`names_surface` false), views of all
+/// surfaces count.
 fn settled(situation: &Situation, call: &Call, doubt: &Doubt, names_surface: bool) -> Result<f64, CallError> {
     let from = situation.candidate(argument(call, 0)?)?;
     let surfaces = match names_surface {

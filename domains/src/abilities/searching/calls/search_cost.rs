@@ -1,7 +1,7 @@
-//! `[search-cost ?on]`: penalty in seconds for a look in vain, counted at the plan's first look at
-//! a surface: (1 - p) / p times the time of drive and look, where p is the probability that this
-//! look finds the target. With drive and look the sum is time / p, and visiting surfaces in that
-//! order is optimal if each is looked at once. Zero if all surfaces must be looked at.
+//! `[search-cost ?on]`: penalty in seconds for a view in vain, added to the plan's first view of a
+//! surface: (1 - p) / p times the time of drive and view, where p is the probability that this view
+//! finds the target. Drive, view and penalty then sum to time / p, and visiting surfaces in ascending
+//! order of that sum is optimal if each is viewed once. Zero if all surfaces must be viewed.
 
 use descry_planner::{Answer, Call, CallError};
 use serde::{Deserialize, Serialize};
@@ -9,20 +9,20 @@ use serde::{Deserialize, Serialize};
 use crate::ability::argument;
 use crate::situation::Situation;
 
-/// Maximum penalty, seconds; with almost nothing left to find, all looks are alike.
+/// Maximum penalty, seconds, for a view that would find almost nothing.
 const MOST_S: f64 = 10_000.0;
 
-/// Evidence for a first look at a surface.
+/// Expected result and cost of a plan's first view of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FirstLook {
-    /// Probability that the look finds the target, 0 to 1.
+    /// Probability that the view finds the target, 0 to 1.
     pub finds: f64,
-    /// Duration of drive and look, seconds.
+    /// Duration of drive and view, seconds.
     pub takes_s: f64,
 }
 
 impl Situation {
-    /// Data of the first look at a surface; `None` if looks in vain have no penalty.
+    /// Data of a plan's first view of a surface; `None` if views in vain have no penalty.
     pub fn first_look(&self, on: usize) -> Option<FirstLook> {
         let is_open = |n: &usize| self.confidence(*n) < self.threshold;
         let mut open: Vec<usize> = (0..self.things.len()).filter(is_open).collect();
@@ -38,7 +38,7 @@ impl Situation {
         Some(FirstLook { finds, takes_s: self.going_there_s(on) })
     }
 
-    /// Seconds that a first look at a surface may turn out to have been in vain for.
+    /// Penalty for a plan's first view of a surface, seconds; 0 if views in vain have none.
     pub(crate) fn in_vain_s(&self, on: usize) -> f64 {
         let first = self.first_look(on);
         first.map_or(0.0, |FirstLook { finds, takes_s }| ((1.0 - finds) / finds * takes_s).min(MOST_S))

@@ -1,5 +1,5 @@
-//! `[worth-a-look ?from ?on]`: true if a look from a viewpoint may settle some doubt. If no look
-//! may, no plan exists and the search ends.
+//! `[worth-a-look ?from ?on]`: true if a view from a viewpoint may settle some doubt. If no view may, no
+//! plan exists and the search ends.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,6 +1,6 @@
-//! `[worth-a-push ?from ?what]`: true if a push from a viewpoint would move an obstacle and so
-//! enable looks that settle what no look can settle now. Pushes are planned one at a time, as each
-//! reveals whether the next is worthwhile.
+//! `[worth-a-push ?from ?what]`: true if a push from a viewpoint would move an obstacle and so enable
+//! views that settle what no view can settle now. Pushes are planned one at a time, as each reveals
+//! whether the next is worthwhile.
 
 use descry_planner::{Answer, Call, CallError};
 

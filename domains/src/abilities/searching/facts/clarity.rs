@@ -10,7 +10,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.surfaces.len()).map(fluent).collect()
 }
 
-/// Bounds on the certainty; unknown for a surface without a look.
+/// Bounds on the clarity of a surface; unknown for a surface that was not viewed.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     match of {
         [Referent::Named(on)] => match s.surface(on) {

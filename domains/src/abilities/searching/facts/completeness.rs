@@ -1,4 +1,5 @@
-//! `(completeness ?of)`: certainty of which objects belong to a kind, and that no more are hidden.
+//! `(completeness ?of)`: certainty that all objects of a kind are found: which of the seen ones belong
+//! to the kind, and that no more are hidden.
 
 use crate::range::{Range, Referent};
 use crate::situation::Situation;
@@ -10,7 +11,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.kinds.len()).map(fluent).collect()
 }
 
-/// Bounds on the certainty; unknown for a kind that was not searched.
+/// Bounds on the completeness of a kind; unknown for a kind that was not searched.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     match of.first() {
         Some(Referent::Named(kind)) => match s.kind(kind) {

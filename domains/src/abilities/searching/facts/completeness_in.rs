@@ -1,6 +1,6 @@
-//! `(completeness-in ?of ?where)`: certainty that all objects of a kind in a room are found. For
-//! the rooms that are asked about, at least the certainty of all these rooms together; unknown for
-//! other rooms.
+//! `(completeness-in ?of ?where)`: certainty that all objects of a kind in a room are found. In a room
+//! that the goal asks about it is the certainty for all requested surfaces together, a lower bound; in
+//! other rooms it is 0.
 
 use super::completeness;
 use crate::range::{Range, Referent};
@@ -22,7 +22,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     lines
 }
 
-/// Bounds on the certainty: those of the whole kind if the goal asks about all of the room, else
+/// Bounds on the certainty: those of the whole kind if all surfaces of the room are requested, else
 /// unknown.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(kind), Referent::Named(room)] = of else { return Range::UNKNOWN };

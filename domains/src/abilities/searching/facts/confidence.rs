@@ -10,7 +10,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.things.len()).map(fluent).collect()
 }
 
-/// Bounds on the certainty; zero for a thing that counts as *not there*.
+/// Bounds on the confidence in a thing's place; zero for a thing that counts as *not there*.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(what)] = of else { return Range::UNKNOWN };
     let Ok(what) = s.thing(what) else { return Range::UNKNOWN };

@@ -18,7 +18,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     atoms
 }
 
-/// Bounds on the truth, from all looks so far.
+/// Bounds on the truth of `(is ?what ?kind)` by the views so far: true, false or unknown.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [what, Referent::Named(kind)] = of else { return Range::UNKNOWN };
     let Ok(of) = s.kind(kind) else { return Range::UNKNOWN };

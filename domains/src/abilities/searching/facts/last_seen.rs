@@ -5,7 +5,7 @@ use descry_memory::remember::Recollection;
 
 use crate::situation::Situation;
 
-/// Remembered sought objects, each with its last sighting and the current time.
+/// Sought things that an earlier run saw: symbol, last sighting, and the current Unix time in seconds.
 fn remembered(s: &Situation) -> impl Iterator<Item = (&str, &Recollection, f64)> {
     let past = s.past.as_ref();
     let own = s.things.iter().filter(|t| t.track.is_none());

@@ -1,4 +1,4 @@
-//! Belief facts in the words of a domain: one file per fact, and their list.
+//! Facts about the belief: one file per predicate or function, and their list.
 
 mod clarity;
 mod completeness;
@@ -13,7 +13,7 @@ mod sure;
 
 use crate::ability::Fact;
 
-/// Every fact.
+/// All facts of *searching*.
 pub(super) const ALL: &[Fact] = &[
     Fact {
         name: "confidence",

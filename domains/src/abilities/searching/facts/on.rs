@@ -1,4 +1,4 @@
-//! `(on ?what ?on)`: a sought object stands on a surface, as surely as was asked for.
+//! `(on ?what ?on)`: a thing stands on a surface with at least the requested confidence.
 
 use super::presence;
 use crate::range::{Range, Referent};
@@ -17,7 +17,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     atoms
 }
 
-/// Bounds on the truth, from all looks so far.
+/// Bounds on the truth of `(on ?what ?on)` by the views so far: true, false or unknown.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let there = match of {
         [Referent::Seen(track), Referent::Named(on)] => Range::exactly(f64::from(u8::from(track.on == **on))),

@@ -10,7 +10,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.things.len()).map(fluent).collect()
 }
 
-/// Bounds on the certainty; unknown for an object that was not seen.
+/// Bounds on that certainty; unknown for an object that was neither seen nor found to be *not there*.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(what)] = of else { return Range::UNKNOWN };
     let Ok(what) = s.thing(what) else { return Range::UNKNOWN };

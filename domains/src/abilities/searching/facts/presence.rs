@@ -12,7 +12,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.things.len()).flat_map(|what| surfaces.clone().map(move |on| fluent(what, on))).collect()
 }
 
-/// Bounds on the certainty from all looks so far; zero for a thing that counts as *not there*.
+/// Bounds on that certainty by the views so far; zero for a thing that counts as *not there*.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [what, on] = of else { return Range::UNKNOWN };
     let on = match on {

@@ -1,4 +1,4 @@
-//! `(sure)`: the confidence that was asked for.
+//! `(sure)`: the confidence that the goal requires, 0 to 1.
 
 use crate::situation::Situation;
 

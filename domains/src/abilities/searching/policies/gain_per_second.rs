@@ -1,4 +1,5 @@
-//! `gain-per-second`: greedy, the look with the highest expected settled doubt per second.
+//! `gain-per-second`: greedy, the look with the greatest share of the doubt expected to be settled per
+//! second.
 
 use super::policy::{Look, Policy, best};
 use crate::looking::looks::LOOK_S;

@@ -1,8 +1,9 @@
 //! Policies that choose the next look: one file each behind one trait, and their list.
 //!
-//! `plan`, the way that descry goes by default, is not among them: it is the planner, which weighs gain against cost over
-//! several looks. The others choose one look after another; they are what it is measured against. All act on the same belief
-//! and declare by the same thresholds. All but the sweep stop when no look would settle anything that is worth a look.
+//! The default, `plan`, is no policy but the planner, which weighs gain against cost over several looks.
+//! A policy chooses one look after another and serves as a baseline. All use the same belief and the
+//! same thresholds for declaring a result. All but the sweep stop when no look is expected to settle any
+//! doubt.
 
 mod gain_per_second;
 mod most_unknown;
@@ -23,18 +24,18 @@ pub use policy::{Foresight, Look, Policy, best};
 use crate::belief::doubt::Taken;
 use crate::situation::Situation;
 
-/// The planner's name among the policies.
+/// Name that stands for the planner in the list of policies.
 pub const PLAN: &str = "plan";
 
-/// Who chooses in a run.
+/// Choice of the next look in a run, by the planner or by a policy.
 pub struct Chooser {
-    /// Maker of the choice.
+    /// Planner or policy that chooses.
     pub by: By,
-    /// True if the first look is taken from the body's pose, without a choice.
+    /// True if the first look is taken from the body's initial pose, without a choice.
     pub first_look_here: bool,
 }
 
-/// Maker of the choice where to look next.
+/// Planner or policy that chooses where to look next.
 pub enum By {
     /// The planner.
     Planner,
@@ -48,7 +49,8 @@ impl From<By> for Chooser {
     }
 }
 
-/// Makes a policy for a run, from the run's seed and foresight if available.
+/// Makes a policy from the run's seed and foresight; `None` if the policy needs foresight and there is
+/// none.
 type Make = fn(u64, Option<Foresight>) -> Option<Box<dyn Policy>>;
 
 /// All policies: name, description, constructor.
@@ -88,7 +90,8 @@ pub enum PolicyError {
         /// Names of all policies.
         known: String,
     },
-    /// The policy needs foresight, which only experiments have.
+    /// The policy needs foresight, knowledge of what each look shows, which only simulated experiments
+    /// have.
     #[error(
         "the policy \"{name}\" knows in advance what each look shows and is for experiments in simulation only\n  take another, such as plan"
     )]
@@ -108,10 +111,11 @@ pub fn about(name: &str) -> Option<&'static str> {
     ALL.iter().find(|(known, ..)| *known == name).map(|(_, about, _)| *about)
 }
 
-/// The policy of a name.
+/// Chooser for the planner or a policy with this name.
 ///
 /// # Errors
-/// [`PolicyError`] says what there is.
+///
+/// [`PolicyError`] for an unknown name, or if the policy needs foresight and there is none.
 pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Chooser, PolicyError> {
     if name == PLAN {
         return Ok(By::Planner.into());
@@ -124,8 +128,8 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
         .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
 }
 
-/// True if the policy chooses the next step: a requested object is still sought and the hands are
-/// free. Other steps are left to the planner.
+/// True if the next look is a policy's choice: something requested is still uncertain, or nothing is
+/// requested, and the hand is empty. Other steps are left to the planner.
 pub fn is_asked(s: &Situation) -> bool {
     let own: Vec<usize> = (0..s.things.len()).filter(|&n| s.things[n].track.is_none()).collect();
     let unsure = own.iter().any(|&n| s.confidence(n) < s.threshold)
@@ -134,7 +138,8 @@ pub fn is_asked(s: &Situation) -> bool {
     s.held.is_none() && (unsure || own.is_empty() && s.kinds.is_empty() && s.asked.is_empty())
 }
 
-/// Next look of a policy, except infeasible ones; `None` if the policy gives up.
+/// Next look that a policy chooses among those not barred; `None` if the policy gives up or nothing is
+/// left.
 pub fn next(
     policy: &mut dyn Policy,
     situation: &Situation,
@@ -155,7 +160,7 @@ pub fn behind(situation: &Situation, is_barred: &dyn Fn(&Look) -> bool) -> Optio
     gain_per_second::GainPerSecond.choose(situation, &looks)
 }
 
-/// Look with the highest gain from the current pose; `None` if there is none.
+/// Look from the current pose that settles the greatest share of the doubt; `None` if there is none.
 pub fn here(situation: &Situation) -> Option<Look> {
     let looks: Vec<Look> = open(situation).into_iter().filter(|look| look.from == situation.at).collect();
     best(&looks, |look| look.gain)
@@ -186,7 +191,7 @@ pub fn travel_s(situation: &Situation, to: usize) -> f64 {
     }
 }
 
-/// Share of the goal's doubt that a look would settle.
+/// Share of the goal's doubts that a look would settle, averaged over the doubts, 0 to 1.
 pub fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
     let doubts = situation.doubts();
     let shares = doubts.iter().map(|doubt| doubt.share_settled(situation, (from, on), Taken::default()));

@@ -6,7 +6,7 @@ use crate::situation::Situation;
 
 #[derive(Default)]
 pub(super) struct NearestSurface {
-    /// Current surface.
+    /// Index of the surface that is being searched.
     on: Option<usize>,
 }
 

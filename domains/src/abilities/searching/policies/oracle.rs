@@ -1,6 +1,6 @@
-//! `oracle`: knows how much of the target each look truly shows, and looks from where most can be
-//! seen. To confirm absence, or after that look, takes the look that settles most doubt. For
-//! experiments only.
+//! `oracle`: knows what each look truly shows of the target, and takes the look that shows most. Where
+//! none shows any, as with an absent target, takes the look that settles most doubt. For experiments
+//! only.
 
 use super::policy::{Foresight, Look, Policy, best};
 use crate::situation::Situation;

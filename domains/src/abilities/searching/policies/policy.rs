@@ -4,14 +4,14 @@ use descry_robots::Place;
 
 use crate::situation::Situation;
 
-/// Possible look.
+/// Possible look: a view of a surface from a candidate pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// The candidate to look from.
+    /// Index of the candidate pose.
     pub from: usize,
-    /// Surface to look at.
+    /// Index of the surface.
     pub on: usize,
-    /// Seconds of driving until then.
+    /// Driving time to the candidate, seconds.
     pub travel_s: f64,
     /// Expected share of the doubt that the look settles, 0 to 1.
     pub gain: f64,
@@ -29,11 +29,12 @@ pub trait Policy: Send {
     }
 }
 
-/// True visibility of the requested object in a look from a place at a named surface, 0 to 1;
-/// available in simulated experiments only.
+/// True visibility of the requested object in a look from a place at a named surface, 0 to 1; known in
+/// simulated experiments only.
 pub type Foresight = Box<dyn Fn(&Place, &str) -> f64 + Send>;
 
-/// The look of the greatest value; among equals the nearest, then the first.
+/// Look with the greatest value; among equals the one with the shortest drive, then the lowest indices.
+/// `None` without looks.
 pub fn best(looks: &[Look], value: impl Fn(&Look) -> f64) -> Option<Look> {
     let valued = looks.iter().map(|look| (value(look), look));
     let better = |a: &(f64, &Look), b: &(f64, &Look)| {

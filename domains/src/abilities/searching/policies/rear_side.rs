@@ -9,7 +9,7 @@ use super::policy::{Look, Policy, best};
 use super::unseen;
 use crate::situation::Situation;
 
-/// Depth of the rear side behind a seen object, metres.
+/// Horizontal distance from occupied space within which unobserved space counts as rear side, metres.
 const BEHIND_M: f64 = 0.04;
 
 pub(super) struct RearSide;

@@ -7,13 +7,13 @@ use super::policy::Look;
 use crate::situation::Situation;
 use crate::surface::KnownSurface;
 
-/// Distance of the points.
+/// Spacing of the grid points, metres.
 const GRID_M: f64 = 0.05;
 /// Height up to which space counts, metres: that of the tallest published object.
 const HEIGHT_M: f64 = 0.28;
 
-/// Number of unobserved points accepted by `counts` that a look would show, given known occluders;
-/// equal for all looks while the surface is unknown.
+/// Number of unobserved grid points accepted by `counts` that a look would show past known occluders; 0
+/// for a look without a camera pose.
 pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point3<f64>) -> bool) -> f64 {
     let Some(map_from_camera) = situation.camera(look.from, look.on) else { return 0.0 };
     let eye = Point3::from(map_from_camera.translation.vector);
@@ -26,7 +26,7 @@ pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point
     above(&situation.surfaces[look.on]).iter().filter(|p| shown(p)).count() as f64
 }
 
-/// The grid above a surface's outline.
+/// Grid points above a surface, up to [`HEIGHT_M`]; map frame.
 pub fn above(surface: &KnownSurface) -> Vec<Point3<f64>> {
     let Some(centre) = surface.centre() else { return Vec::new() };
     let helper = if surface.up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };

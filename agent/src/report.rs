@@ -26,14 +26,14 @@ pub enum Event {
         said: String,
         /// Goal in PDDL.
         pddl: String,
-        /// Start place of the body.
+        /// Place at which the body starts.
         start: String,
         /// Number of candidate viewpoints.
         candidates: usize,
     },
     /// A new plan was made.
     Planned {
-        /// Number of the planning round, from 1.
+        /// Number of the plan, from 1.
         round: usize,
         /// Reason why the plan was made, in a sentence.
         because: String,
@@ -175,9 +175,9 @@ pub struct Report {
     pub why: String,
     /// Requested object; `None` if the goal is not about a single one.
     pub object: Option<String>,
-    /// Confidence that was reached, 0 to 1.
+    /// Confidence of the answer, 0 to 1.
     pub confidence: f64,
-    /// Confidence that was required, 0 to 1.
+    /// Confidence that an answer requires, 0 to 1.
     pub threshold: f64,
     /// Probability that the requested object is there although it was not found; `None` if not
     /// applicable.

@@ -51,7 +51,7 @@ pub struct Task<'a> {
     pub past: Option<&'a Past>,
 }
 
-/// Observer of a run.
+/// Means of a caller to stop and observe a run.
 pub struct Watcher<'a> {
     /// Stop signal; stops the body first.
     pub stop: &'a Stop,

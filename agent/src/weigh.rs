@@ -42,8 +42,8 @@ const GAINED: f64 = 1e-6;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
-    /// Numbers that the goal (or else the steps' conditions) compares and the plan improves, with
-    /// the value at the plan's end, or at its best moment if the plan consumes them.
+    /// Numeric fluents that the goal (or else the steps' conditions) compares and the plan improves,
+    /// with the value at the plan's end, or at its best moment if the plan consumes them.
     pub numbers: Vec<Expected>,
     /// Steps of the plan up to the first that improves a number; `None` if none of the first steps
     /// does.
@@ -61,11 +61,11 @@ pub struct Weighed {
     pub through: Option<Way>,
     /// Remaining steps of the previous plan; `None` if the new plan has the same.
     pub left: Option<Way>,
-    /// Numbers that the remaining previous plan would improve.
+    /// Numeric fluents that the remaining previous plan would improve.
     pub left_numbers: Vec<Expected>,
 }
 
-/// Number of the domain with its predicted change.
+/// Numeric fluent of the domain, with its predicted change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
     /// Function with arguments, in PDDL.
@@ -215,7 +215,7 @@ impl<'r> Scale<'r> {
         self.counting.iter().flat_map(of).collect()
     }
 
-    /// Arguments of a number, with `?` for those that may differ between plans.
+    /// Arguments of a compared function, with `?` for those that may differ between plans.
     fn any<'o>(&self, of: Vec<&'o str>) -> Vec<&'o str> {
         let Some(aims) = &self.aims else { return of };
         let is_aim = |object: &&str| aims.iter().any(|aim| aim == object);

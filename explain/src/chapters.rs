@@ -73,7 +73,7 @@ pub enum Deed {
     },
     /// The run was interrupted and resumed.
     Resumed,
-    /// A note of perception or of the belief.
+    /// The world model noted something: a perception, a change of belief or the like.
     Noted(Note),
 }
 

@@ -130,7 +130,7 @@ impl Words<'_> {
         &self.domain.vocabulary.task.module(call.module).name
     }
 
-    /// Descriptions of the known ones among some calls, without adjacent duplicates.
+    /// Descriptions of those calls whose meaning is known, without adjacent duplicates.
     fn asked<'c>(&self, calls: impl IntoIterator<Item = &'c CallTerm>) -> Vec<String> {
         let mut all: Vec<String> =
             calls.into_iter().filter_map(|call| self.meaning(self.name(call))).collect();

@@ -160,7 +160,7 @@ pub fn after_looks(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<(
     Ok(all.filter_map(|outcome| Some((outcome.stood_ns?, outcome.said))).collect())
 }
 
-/// History of a number that the goal compares.
+/// History of a numeric fluent that the goal compares.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sought {
     /// Number, in the domain's wording.

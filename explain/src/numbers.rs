@@ -1,5 +1,5 @@
-//! Numbers of a domain that express confidence in the answer: those that the goal compares, under
-//! the names that plans use.
+//! Numeric fluents of a domain that express confidence in the answer: those that the goal compares,
+//! under the names that plans use.
 
 use descry_agent::compared::{self, words};
 use descry_agent::standing::InDoubt;
@@ -11,7 +11,7 @@ use super::standings::{Standing, certainty};
 /// Value below which a number says nothing about an object's position.
 const NEXT_TO_NOTHING: f64 = 0.05;
 
-/// Number that expresses confidence.
+/// Numeric fluent that expresses confidence, with its values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sure {
     /// Name of the number in PDDL, or a description in words.

@@ -16,7 +16,7 @@ use descry_agent::weigh::Expected;
 pub struct Outcome {
     /// Time of the state on the body's clock, nanoseconds; `None` for the outcome of a step.
     pub stood_ns: Option<i64>,
-    /// The sentences.
+    /// Text of one or more sentences.
     pub said: String,
 }
 

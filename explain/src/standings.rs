@@ -20,7 +20,7 @@ pub struct Standing {
     pub doubts: Vec<InDoubt>,
     /// Belief about objects.
     pub belief: Belief,
-    /// Numbers of the domain, by name in PDDL.
+    /// Values of the numeric fluents, by name in PDDL.
     pub numbers: BTreeMap<String, f64>,
 }
 

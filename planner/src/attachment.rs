@@ -85,7 +85,7 @@ pub enum Read {
 pub struct Call {
     /// The module's PDDL name.
     pub module: Arc<str>,
-    /// Kind of the module.
+    /// Kind of the module, and so of the expected answer.
     pub kind: CallKind,
     /// Names of the objects that the call is about; in an action with a `:grounding` call the proposed parameter
     /// comes last.
@@ -186,7 +186,7 @@ impl Answer {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CallError {
-    /// Failure reported by the attachment.
+    /// Failure that the attachment itself reports, with its message.
     #[error("{0}")]
     Failed(String),
     /// The attachment read a fact that its `reads` does not declare, or whose value has another
@@ -227,7 +227,7 @@ pub struct AttachmentError {
     pub module: String,
     /// Name of the attachment.
     pub attachment: String,
-    /// Cause.
+    /// Reason why the call failed.
     pub cause: CallError,
 }
 

@@ -175,7 +175,7 @@ impl<'a> Calls<'a> {
         Bound { asked, arguments: &origin.arguments, sources: &self.sources[call as usize] }
     }
 
-    /// Answer of a condition module.
+    /// Truth that the condition module of `call` answers.
     pub fn truth(
         &self,
         call: CallId,

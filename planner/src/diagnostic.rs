@@ -137,7 +137,7 @@ impl Diagnostic {
 pub struct Findings {
     /// Source texts; a span's `source` is the index here.
     pub sources: Vec<Source>,
-    /// The findings.
+    /// Findings in text order.
     pub list: Vec<Diagnostic>,
 }
 

@@ -67,7 +67,7 @@ pub enum NoPlan {
     Exhausted,
     /// Other reason, in one sentence.
     Finding {
-        /// The sentence.
+        /// Reason, in one sentence.
         message: String,
         /// Suggested remedy.
         help: Option<String>,

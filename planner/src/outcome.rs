@@ -68,7 +68,7 @@ pub enum Outcome {
     Solved {
         /// Best plan found.
         plan: Plan,
-        /// Statistics.
+        /// Statistics of the planning call.
         statistics: Statistics,
     },
     /// Proof that no plan exists. If `why` names actions that may overlap themselves, the proof
@@ -76,7 +76,7 @@ pub enum Outcome {
     Unsolvable {
         /// Explanation why there is no plan.
         why: Explanation,
-        /// Statistics.
+        /// Statistics of the planning call.
         statistics: Statistics,
     },
     /// Planning was stopped before a plan was found, or (with `anytime`) before the plan was proven
@@ -84,14 +84,14 @@ pub enum Outcome {
     OutOfTime {
         /// Best plan found; `None` if there is none yet.
         best: Option<Plan>,
-        /// Statistics.
+        /// Statistics of the planning call.
         statistics: Statistics,
     },
     /// The memory limit was reached.
     OutOfMemory {
         /// Best plan found; `None` if there is none yet.
         best: Option<Plan>,
-        /// Statistics.
+        /// Statistics of the planning call.
         statistics: Statistics,
     },
 }
@@ -141,7 +141,7 @@ pub enum PlanError {
     /// An attachment failed. The finding points at the call in the domain.
     #[error("{error}")]
     Attachment {
-        /// The failed call.
+        /// Error of the failed call.
         error: Box<AttachmentError>,
         /// Findings with the domain's text.
         findings: Findings,
@@ -149,7 +149,7 @@ pub enum PlanError {
     /// A plan that the search found failed validation: an error in the planner.
     #[error("internal error: a plan that was found is not valid: {reason}\n{plan}")]
     Internal {
-        /// Message of the validator.
+        /// Reason why the validator rejects the plan.
         reason: String,
         /// Plan that failed validation.
         plan: Plan,

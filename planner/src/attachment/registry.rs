@@ -17,7 +17,7 @@ pub struct CallStatistics {
     pub calls: u64,
     /// Relaxed calls that the attachment itself answered (not the cache).
     pub relaxed: u64,
-    /// Questions that the cache answered.
+    /// Number of questions that a cache answered.
     pub hits: u64,
     /// Time spent in the attachment by the clock of [`Attachments::with_clock`], seconds; 0 without
     /// a clock.

@@ -17,7 +17,7 @@ use super::task::{
 /// Times that differ by less than this count as equal, seconds.
 const ROUNDING_S: f64 = 1e-6;
 
-/// An operator of the relaxed task.
+/// Operator of the relaxed task; `missing` counts its preconditions that are not reached yet.
 struct Operator {
     missing: u32,
     /// Latest earliest time among the preconditions that are known so far, seconds.

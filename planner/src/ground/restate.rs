@@ -52,10 +52,12 @@ pub(crate) struct Restated {
     facts: FxHashMap<Fact, GroundFact>,
     objects: FxHashMap<GroundFluent, FxHashMap<ObjectId, GroundFact>>,
     numbers: FxHashMap<GroundFluent, u32>,
-    /// Initial facts that are not part of the grounded task and must stay as they are; likewise the
-    /// numbers and values of object functions below.
+    /// Initial facts that are not part of the grounded task and must stay as they are.
     granted_facts: FxHashSet<Fact>,
+    /// Initial numbers that are not part of the grounded task and must stay as they are.
     granted_numbers: FxHashMap<GroundFluent, f64>,
+    /// Initial values of object functions that are not part of the grounded task and must stay as they
+    /// are.
     granted_objects: FxHashMap<GroundFluent, ObjectId>,
     timed: Vec<TimedInitial>,
     goal: Scoped<Condition>,

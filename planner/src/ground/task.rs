@@ -17,7 +17,7 @@ pub type ComparisonId = u32;
 /// Fact: a variable has a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct GroundFact {
-    /// The variable.
+    /// Variable that has the value.
     pub variable: VariableId,
     /// Value of the variable, below [`Variable::domain_size`].
     pub value: u32,
@@ -299,9 +299,9 @@ pub struct Origin {
 pub struct GroundAction {
     /// Lifted action and its arguments.
     pub origin: Origin,
-    /// Precondition.
+    /// Precondition of the action.
     pub condition: Conjunction,
-    /// Effects.
+    /// Effects of the action.
     pub effects: Vec<GroundEffect>,
     /// Contribution to the metric, if that is additive ([`GroundMetric::additive`]).
     pub cost: GroundExpression,
@@ -424,7 +424,7 @@ pub struct Values {
 pub struct GroundTask {
     /// Finite-domain variables, derived ones last.
     pub variables: Vec<Variable>,
-    /// Numeric fluents.
+    /// Numeric fluents that are part of the state.
     pub numerics: Vec<NumericFluent>,
     /// Numeric comparisons that conditions refer to, each once.
     pub comparisons: Vec<GroundComparison>,
@@ -440,7 +440,7 @@ pub struct GroundTask {
     pub timed: Vec<TimedEffect>,
     /// Initial state; axioms whose bodies contain calls are not applied in it.
     pub initial: Values,
-    /// Goal.
+    /// Goal condition.
     pub goal: Conjunction,
     /// Metric; `None`: the number of steps counts, or in temporal tasks the makespan.
     pub metric: Option<GroundMetric>,

@@ -10,15 +10,15 @@ const RELATIVE_TOLERANCE: f64 = 1e-12;
 /// Relation of two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Relation {
-    /// `<`
+    /// Less than (`<`).
     Less,
-    /// `<=`
+    /// Less than or equal (`<=`).
     AtMost,
-    /// `=`
+    /// Equal within the tolerance (`=`).
     Equal,
-    /// `>=`
+    /// Greater than or equal (`>=`).
     AtLeast,
-    /// `>`
+    /// Greater than (`>`).
     Greater,
     /// Not equal; results only from negating an equation.
     Unequal,

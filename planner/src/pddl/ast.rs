@@ -31,14 +31,14 @@ pub struct Typed {
 pub struct Signature {
     /// Name of the predicate, function or module.
     pub name: Name,
-    /// Parameters.
+    /// Parameters, each with its types.
     pub parameters: Vec<Typed>,
 }
 
 /// Declared function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FunctionDeclaration {
-    /// Name and parameters.
+    /// Name and parameters of the function.
     pub signature: Signature,
     /// Types of the function's value; empty or `number` for a numeric function.
     pub result: Vec<Name>,
@@ -47,7 +47,7 @@ pub struct FunctionDeclaration {
 /// Declaration of a module, such as `(can-see ?p - pose conditionchecker fn@lib.so)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModuleDeclaration {
-    /// Name and parameters.
+    /// Name and parameters of the module.
     pub signature: Signature,
     /// Functions or predicates that an effect module writes, with arguments; empty for other kinds.
     pub writes: Vec<TermAst>,

@@ -41,10 +41,11 @@ use upright::Doubt;
 /// reach.
 const MOST_AREA_M2: f64 = 4.0 * (FARTHEST_M as f64) * (FARTHEST_M as f64);
 
-/// Minimum number of object returns at least `WITHIN_M` inside the outline, metres; fewer are
-/// accidental. From: chosen, a board that a cupboard stands against is laid 2 cm aside with 4 mm
-/// less.
+/// Minimum number of object returns above a surface for objects to stand there; fewer are
+/// accidental. From: chosen.
 const THINGS: usize = 20;
+/// Minimum distance from the surface's edge of a return that counts as of an object on the surface,
+/// metres. From: chosen, a board that a cupboard stands against is laid 2 cm aside with 4 mm less.
 const WITHIN_M: f64 = 0.02;
 
 /// Finds the supporting surface: the best of [`find_surfaces`] that satisfies the options.
@@ -59,7 +60,7 @@ pub fn find_surface(
     best(find_surfaces(cloud, seen, options)?, options)
 }
 
-/// First supporting surface of the list from [`find_surfaces`].
+/// First surface of the list that satisfies the options, if it is or may be a support.
 ///
 /// # Errors
 /// If there is none, with the reason.

@@ -1,12 +1,13 @@
 //! Connected sets of cells in a plane.
 
-/// The largest set of cells that hang together, up to two cells apart (shadows of objects); ties go to the first in order. Each cell
-/// is named once.
+/// Largest set of connected cells, up to two cells apart (shadows of objects); of equal ones the
+/// first in order. `cells`: each once, with its number of returns.
 pub fn largest_part(cells: Vec<([i32; 2], u32)>) -> Vec<[i32; 2]> {
     parts(cells).into_iter().next().unwrap_or_default()
 }
 
-/// The sets of cells that hang together so, the one with most returns first; ties go to the first in order. Each cell is named once.
+/// Sets of connected cells, up to two cells apart, the one with most returns first; of equal ones
+/// the first in order. `cells`: each once, with its number of returns.
 pub fn parts(mut cells: Vec<([i32; 2], u32)>) -> Vec<Vec<[i32; 2]>> {
     cells.sort_unstable_by_key(|(cell, _)| rank(*cell));
     let mut parts: Vec<(u32, Vec<[i32; 2]>)> = Vec::new();
@@ -25,25 +26,26 @@ pub fn parts(mut cells: Vec<([i32; 2], u32)>) -> Vec<Vec<[i32; 2]>> {
     parts.into_iter().map(|(_, cells)| cells).collect()
 }
 
-/// A number in the order of the cells: by x, then by y.
+/// Key that sorts cells by x, then by y.
 fn rank(cell: [i32; 2]) -> u64 {
     let [x, y] = cell.map(|at| u64::from(at.cast_unsigned() ^ 1 << 31));
     x << 32 | y
 }
 
-/// Cells of one column that hang together.
+/// Connected cells of one column: one x, successive y.
 struct Run {
     x: i32,
-    /// First and the last.
+    /// First and last y.
     ends: [i32; 2],
-    /// Index of the run's first cell among all cells in order, and its number of cells.
+    /// Index of the run's first cell among all cells in order.
     at: usize,
+    /// Number of cells.
     len: usize,
 }
 
-/// First connected cell, for each of the cells in order.
+/// Index of the first cell of the connected set of each cell, for all cells in order.
 fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
-    /// Cells so far apart hang together: shadows of objects. From: chosen.
+    /// Maximum distance of connected cells, in cells: shadows of objects. From: chosen.
     const GAP: i32 = 2;
     let mut at = 0;
     let in_column = order.chunk_by(|([x, y], _), ([next, on], _)| x == next && on.saturating_sub(*y) <= GAP);

@@ -9,9 +9,9 @@ pub enum SurfaceError {
     /// Too few points to speak of a surface.
     #[error("{found} finite points do not make a surface: at least {needed} are needed")]
     TooFew {
-        /// Finite points in the cloud.
+        /// Number of finite points in the cloud.
         found: usize,
-        /// Needed.
+        /// Minimum number of points.
         needed: usize,
     },
     /// The points lie where no sensor of a robot measures.
@@ -19,15 +19,15 @@ pub enum SurfaceError {
         "{far} of {found} points lie farther than {FARTHEST_M} m from the origin: the coordinates are damaged, or in another unit or order of bytes"
     )]
     TooFar {
-        /// Finite points in the cloud.
+        /// Number of finite points in the cloud.
         found: usize,
-        /// Number of returns out of range.
+        /// Number of points that are out of range.
         far: usize,
     },
-    /// No plane is as asked for.
+    /// No plane is as requested.
     #[error("{}: widen the height band, give or check the direction of up, or look at the table", no_plane(wanted, *tried))]
     NotFound {
-        /// Planes that were looked at.
+        /// Number of planes examined.
         tried: usize,
         /// The wanted surface, in words.
         wanted: String,
@@ -42,7 +42,7 @@ pub enum SurfaceError {
         "all that is level here is the floor ({because}): look at the table, or give the height band that it is in"
     )]
     OnlyFloor {
-        /// The sign of the floor.
+        /// Evidence that the surface is the floor.
         because: Sign,
     },
     /// A surface that is as wanted may be the floor as well as a table.
@@ -50,7 +50,7 @@ pub enum SurfaceError {
         "a level surface of {area_m2:.2} m² may be a table or the floor ({because}): look where its edge is in view, or give the height band that it is in"
     )]
     Untold {
-        /// Area of the largest, square metres.
+        /// Area of the surface, square metres.
         area_m2: f64,
         /// Evidence that leaves the role undecided.
         because: Sign,
@@ -58,7 +58,7 @@ pub enum SurfaceError {
     /// None of the requested surfaces is a support.
     #[error("what is level here is nothing to stand things on ({because}): look at the table")]
     OnlyOther {
-        /// The sign of that role.
+        /// Evidence that the surface is no support.
         because: Sign,
     },
 }

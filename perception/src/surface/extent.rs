@@ -20,7 +20,8 @@ use rustc_hash::FxHashSet;
 const HIDDEN_M: f64 = 0.3;
 /// Maximum height of an object on a plane, metres. From: chosen.
 pub(crate) const TALLEST_M: f64 = 0.6;
-/// Depth below the plane's edge from which an object stands beside the plane, metres. From: chosen.
+/// Maximum depth below a plane of points that show an object to stand beside the plane, metres.
+/// From: chosen.
 const BESIDE_M: f64 = 0.3;
 
 /// Tested positions inside a cell, from its corner, in cells. From: chosen, the middle and near the
@@ -41,13 +42,13 @@ pub(super) enum Owner {
     Part(u32),
 }
 
-/// The owners of the cells of a plane.
+/// Owner of each cell of a plane.
 pub(super) type Owners = Tiles<Owner>;
 
 /// The occlusion of a plane in the views of the cameras.
 pub(super) struct Hiding<'a> {
     cameras: Vec<Above<'a>>,
-    /// Cells across which a plane reaches on.
+    /// Maximum number of cells over which a plane continues hidden.
     rings: usize,
 }
 
@@ -56,9 +57,9 @@ struct Above<'a> {
     map: &'a DepthMap,
     /// Height of the camera above the plane, metres.
     high_m: f64,
-    /// Corner of cell zero in the camera frame, metres; further fields: steps of one cell in x and
-    /// in y.
+    /// Corner of cell zero in the camera frame, metres.
     origin: Vector3<f64>,
+    /// Steps of one cell along x and y of the plane, camera frame, metres.
     steps: [Vector3<f64>; 2],
     /// Length of the longest image ray per metre of depth.
     longest: f64,
@@ -98,8 +99,8 @@ impl<'a> Hiding<'a> {
         any
     }
 
-    /// Decides for each neighbour of some cells whether the plane may continue there; keeps
-    /// neighbours that are not inside their own part.
+    /// Decides for each untested neighbour of the border cells whether the plane may continue
+    /// there; keeps the border cells that are not surrounded by their own part.
     fn ask(&self, owners: &mut Owners, border: &mut Vec<[i32; 2]>, unseen: bool) {
         /// Number of cells per thread. From: work.
         const SOME: usize = 256;

@@ -14,10 +14,12 @@ use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Cell size for connecting a plane's points, metres. From: chosen.
 const CELL_M: f64 = 0.03;
-/// Minimum mean number of samples per cell of a wide plane; with fewer, cells double in width, at
-/// most twice, while at least `MANY` remain. From: chosen.
+/// Minimum mean number of samples per cell of a wide plane; with fewer, its cells are wider.
+/// From: chosen.
 const FULL: f64 = 2.0;
+/// Number of cells of a plane below which the cells are made smaller in any case. From: chosen.
 const MANY: f64 = 1000.0;
+/// Maximum side of a cell, metres. From: chosen.
 const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
 /// Minimum number of samples of a piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
@@ -114,10 +116,12 @@ fn joined(parts: Vec<Vec<[i32; 2]>>, hiding: &Hiding) -> Vec<Vec<[i32; 2]>> {
     whole
 }
 
-/// Numbers of samples near a plane, and equally far below and above.
+/// Numbers of samples near a plane.
 #[derive(Clone, Copy, Default)]
 struct Counts {
+    /// Number of samples on the plane, within the measurement error.
     near: u32,
+    /// Number of samples below and above the plane, up to twice the measurement error away.
     beside: [u32; 2],
 }
 
@@ -145,7 +149,7 @@ impl Counts {
     }
 }
 
-/// Corners of the hull around cells, metres.
+/// Corners of the convex hull around cells, metres.
 fn hull_of(cells: &[[i32; 2]], side_m: f64) -> Vec<[f64; 2]> {
     // What lies between two of one column is no corner.
     let columns = cells.chunk_by(|a, b| a[0] == b[0] && a[1] < b[1]);
@@ -154,9 +158,9 @@ fn hull_of(cells: &[[i32; 2]], side_m: f64) -> Vec<[f64; 2]> {
     convex_hull(corners.map(|cell| cell.map(|at| f64::from(at) * side_m)).collect())
 }
 
-/// A plane in square cells.
+/// A plane divided into square cells.
 pub(super) struct Grid {
-    /// Turns the plane's normal into z.
+    /// Rotation from the world that turns the plane's normal into z.
     pub turn: UnitQuaternion<f64>,
     /// Side of a cell, metres.
     pub side_m: f64,
@@ -165,7 +169,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The finest.
+    /// Finest grid of a plane.
     pub fn fine(plane: &Plane) -> Grid {
         let turn = level(plane);
         let axes = [Vector3::x(), Vector3::y()].map(|axis| turn.inverse() * axis);
@@ -199,7 +203,7 @@ impl Grid {
     }
 }
 
-/// Turns the normal of a plane into z.
+/// Rotation that turns the normal of a plane into z.
 fn level(plane: &Plane) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&plane.normal, &Vector3::z()).unwrap_or_else(|| {
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
@@ -209,7 +213,8 @@ fn level(plane: &Plane) -> UnitQuaternion<f64> {
     })
 }
 
-/// Surface of a plane with a hull found across a nearly equal one.
+/// Surface of a plane, with a hull found in the nearly equal plane `found_in`; `scale`: cloud
+/// points per sample, `of`: number of all samples.
 fn face(
     plane: &Plane,
     found_in: &Plane,

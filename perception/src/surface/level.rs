@@ -7,14 +7,15 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Surfaces that share so much of the lesser one, seen from above, are in two places. From: chosen.
+/// Share of a surface's area, seen from above, beyond which an overlap means that two surfaces are
+/// in one place. From: chosen.
 const COMMON: f64 = 0.2;
 /// Height range of objects above their surface, metres. From: chosen.
 pub(super) const THINGS_M: (f64, f64) = (0.025, 0.35);
-/// Probability of the up direction from which on it is as good as sure. From: chosen.
+/// Probability of the up direction from which the direction is practically certain. From: chosen.
 pub(super) const SURE: f64 = 0.95;
 
-/// The role of a level surface.
+/// Role of a level surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
@@ -24,7 +25,7 @@ pub enum Role {
     Untold,
     /// The floor.
     Floor,
-    /// None of these.
+    /// Neither a support nor the floor.
     Other,
 }
 
@@ -104,9 +105,9 @@ impl fmt::Display for Sign {
 /// Level plane with its outline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Surface {
-    /// Unit normal in the world, away from the side that carries the objects' weight: up.
+    /// Unit normal in the world: up.
     pub up: Unit<Vector3<f64>>,
-    /// `up · p` of the plane's points, metres.
+    /// Offset of the plane: `up · p` of its points, metres.
     pub offset_m: f64,
     /// Convex outline in the world, anticlockwise seen from above, metres.
     pub hull: Vec<Point3<f64>>,
@@ -120,7 +121,7 @@ pub struct Surface {
     pub share: f64,
     /// World to the surface's frame: z up with 0 on the surface, origin at the middle of the hull.
     pub surface_from_world: Isometry3<f64>,
-    /// The role of the surface.
+    /// Role of the surface.
     pub role: Role,
     /// Evidence for the role.
     pub because: Sign,
@@ -130,7 +131,7 @@ pub struct Surface {
     /// direction was given, or no camera is known.
     #[serde(default = "said")]
     pub up_chance: f64,
-    /// Outlines of the other supports above this surface, metres in the world.
+    /// Other supports above this surface.
     pub over: Vec<Overhang>,
 }
 
@@ -138,17 +139,17 @@ fn said() -> f64 {
     1.0
 }
 
-/// The outline and height of another surface.
+/// Outline and height of a surface above another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Overhang {
-    /// Height above, metres.
+    /// Height above the other surface, metres.
     pub above_m: f64,
     /// Convex outline in the world, anticlockwise seen from above, metres.
     pub hull: Vec<Point3<f64>>,
 }
 
 impl Overhang {
-    /// The outline of the surface, prepared for tests of many points.
+    /// Outline prepared for tests of many points.
     pub(crate) fn outline(&self, up: &Vector3<f64>) -> Outline {
         Outline::of(&self.hull, up)
     }
@@ -189,12 +190,13 @@ impl Surface {
         }
     }
 
-    /// Places of the world as seen from above, in the surface's frame.
+    /// Coordinates x and y of points of the world in the surface's frame, metres.
     pub(super) fn flat(&self, places: &[Point3<f64>]) -> Vec<[f64; 2]> {
         places.iter().map(|p| (self.surface_from_world * p).xy().coords.into()).collect()
     }
 
-    /// True if the surface cuts through the other or lies below it; two supports never do.
+    /// True if the surface crosses or touches the other's plane where both overlap; two supports
+    /// never do.
     pub(super) fn cuts(&self, other: &Surface) -> bool {
         let heights = self.hull.iter().map(|p| other.height_m(p));
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
@@ -218,7 +220,7 @@ impl Surface {
         self.outline().covers(p, margin_m)
     }
 
-    /// The outline made ready to be asked about many points.
+    /// Outline prepared for tests of many points.
     pub fn outline(&self) -> Outline {
         Outline::of(&self.hull, &self.up)
     }

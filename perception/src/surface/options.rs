@@ -5,18 +5,18 @@ use crate::polygon::{self, convex_hull};
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// The options of the search for the surface.
+/// Options of the search for the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurfaceOptions {
     /// Up direction in the world, if known; otherwise estimated from the planes, the objects on
     /// them and the cameras' attitude.
     pub up: Option<Unit<Vector3<f64>>>,
-    /// Most angle between the surface's normal and `up`, radians. From: chosen, 15°.
+    /// Maximum angle between the surface's normal and `up`, radians. From: chosen, 15°.
     pub tilt_rad: f64,
     /// Minimum and maximum height of the surface along `up`, metres, if known.
     pub height_band_m: Option<(f64, f64)>,
-    /// The region of the surface as seen from above, if known: surfaces outside are not wanted.
+    /// Region of the surface as seen from above, if known; surfaces outside are not wanted.
     pub region: Option<Region>,
     /// Minimum area of the surface, square metres. From: chosen.
     pub least_area_m2: f64,
@@ -38,7 +38,7 @@ impl Default for SurfaceOptions {
 }
 
 impl SurfaceOptions {
-    /// True if a surface satisfies the requested height and region, whatever its role.
+    /// True if a surface satisfies the requested height, region and area, whatever its role.
     pub fn wants(&self, surface: &Surface) -> bool {
         let up = self.up.unwrap_or(surface.up);
         // A tilted plane has its height where the surface is, not where the world begins.
@@ -74,12 +74,12 @@ impl SurfaceOptions {
 pub struct Region {
     /// Corners of the convex outline in the world, in either direction, metres.
     pub corners: Vec<Point3<f64>>,
-    /// The maximum distance of the surface outside the region, metres.
+    /// Maximum distance of the surface outside the region, metres.
     pub margin_m: f64,
 }
 
 impl Region {
-    /// True if most of the surface or of the region lies in both.
+    /// True if at least half of the smaller of surface and region lies in the other.
     fn holds(&self, surface: &Surface) -> bool {
         let own_m2 = polygon::area(&convex_hull(surface.flat(&self.corners)));
         let both_m2 = polygon::area(&self.common(surface));

@@ -36,9 +36,11 @@ pub struct Rows {
     rows: Vec<Row>,
 }
 
-/// Intervals along x, metres: certainly covered, and possibly covered.
+/// Row of an outline, as intervals along x.
 struct Row {
+    /// Interval that is certainly covered, metres.
     inside: (f64, f64),
+    /// Interval that is possibly covered, metres.
     around: (f64, f64),
 }
 

@@ -9,21 +9,21 @@ use rustc_hash::FxHashMap;
 
 /// Minimum number of points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
-/// Planes proposed in each round. From: chosen.
+/// Number of planes proposed for each plane found. From: chosen.
 const PROPOSALS: usize = 240;
 /// Maximum number of planes found one after another. From: chosen.
 pub(super) const ROUNDS: usize = 6;
 /// Side of the cubes from which the points of a proposal are drawn, metres. From: chosen.
 const REACH_M: f64 = 0.3;
-/// Points that judge a proposal, at the most. From: chosen.
+/// Maximum number of points that score a proposed plane. From: chosen.
 const JUDGES: usize = 2400;
-/// Judges after which a proposal may be left. From: work.
+/// Number of scoring points between tests whether a proposed plane can still win. From: work.
 const BLOCK: usize = 128;
 /// Number of points per thread. From: work.
 const SOME: usize = 2048;
 
-/// Maximum distance of a measurement from its plane, in standard deviations and in metres (the
-/// larger counts). From: derived, as exactly as an edge is known.
+/// Maximum distance of a measurement from its plane: standard deviations, plus metres.
+/// From: derived, as exactly as an edge is known.
 pub(crate) const BAND: (f64, f64) = (scale::SPREADS, scale::EDGE_M);
 
 #[derive(Clone, Copy)]
@@ -99,9 +99,9 @@ pub(super) fn large_planes(
     }
 }
 
-/// Points of each cube.
+/// Points grouped by the cube that they lie in.
 struct Cubes {
-    /// The cube of each point.
+    /// Number of the cube of each point.
     of: Vec<u32>,
     /// Start of each cube's points in `members`, and the total.
     starts: Vec<u32>,
@@ -184,14 +184,14 @@ struct Judges {
     count: usize,
     origin: Vector3<f64>,
     coordinates: [Vec<f32>; 3],
-    /// Inverse of each judge's maximum distance from its plane, per metre.
+    /// Inverse of the distance from a plane within which each judge supports the plane, per metre.
     per_band: Vec<f32>,
 }
 
 impl Judges {
     fn of(samples: &[Sample]) -> Judges {
-        /// Maximum distance of a supporting judge, in its standard deviations beyond the usual
-        /// band. From: chosen.
+        /// Distance from a plane within which a judge supports the plane: this many standard
+        /// deviations plus `BAND.1` metres. From: chosen.
         const SPREADS: f64 = 2.0;
         let judges = || samples.iter().step_by(samples.len().div_ceil(JUDGES).max(1));
         let (count, origin) =
@@ -210,7 +210,7 @@ impl Judges {
     /// through two steps scores less than the plane of one. `None` as soon as the score cannot
     /// exceed `beaten`.
     fn near(&self, plane: &Plane, beaten: f64) -> Option<f64> {
-        /// Sums side by side. From: work.
+        /// Number of sums side by side (SIMD lanes). From: work.
         const LANES: usize = 8;
         let normal = plane.normal.cast::<f32>();
         let offset = (plane.offset - plane.normal.dot(&self.origin)) as f32;
@@ -281,9 +281,10 @@ fn propose(
 
 /// Weighted least squares on the points near the plane, repeated with a narrowing band.
 fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
-    /// Inlier limits of the refinement steps in standard deviations; the next constant is the limit
-    /// in metres. From: chosen.
+    /// Inlier limits of the refinement steps: these standard deviations plus `BESIDE_M`.
+    /// From: chosen.
     const BANDS: [f64; 4] = [4.0, 3.0, 2.5, 2.5];
+    /// Part of the inlier limit that is the same for all samples, metres. From: chosen.
     const BESIDE_M: f64 = 0.003;
     /// Multiple of the first band beyond which a sample is never considered. From: chosen.
     const EVER: f64 = 3.0;
@@ -327,7 +328,7 @@ fn weight(sample: &Sample) -> f64 {
 struct Sums {
     weight: f64,
     sum: [f64; 3],
-    /// xx xy xz yy yz zz.
+    /// Weighted sums of products of coordinates: xx, xy, xz, yy, yz, zz.
     products: [f64; 6],
 }
 

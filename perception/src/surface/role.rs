@@ -12,9 +12,9 @@ use crate::scale::APART_M;
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Fraction that counts as most: the first number of the second, seven of ten. From: chosen.
+/// Share that counts as most: numerator and denominator. From: chosen.
 const MOST: (usize, usize) = (7, 10);
-/// Rays that are looked at for each camera. From: chosen.
+/// Approximate number of rays used of each camera. From: chosen.
 const RAYS: usize = 5000;
 /// Distance below a surface from which returns count as lower, metres. From: chosen.
 const LOWER_M: f64 = 0.06;
@@ -29,16 +29,16 @@ const PAST_SHARE: f64 = 0.005;
 const PARALLEL: f64 = 0.99;
 /// Margin around an object's outline within which its support must be seen, metres. From: chosen.
 const AROUND_M: f64 = 0.1;
-/// Minimum number of rays that hit the support within this margin. From: chosen.
+/// Minimum number of rays that hit the support within [`AROUND_M`]. From: chosen.
 const AROUND_RAYS: usize = 5;
-/// Maximum deviation of these hits from the support plane, metres. From: chosen.
+/// Maximum distance from the support's plane of a ray that hits it, metres. From: chosen.
 const LEVEL_M: f64 = 0.012;
 /// Minimum and maximum height of an object's top above its support (on the floor: of a step),
 /// metres. From: chosen.
 const THING_M: (f64, f64) = (0.015, 0.3);
-/// Minimum number of samples seen beneath a raised surface. From: chosen.
+/// Minimum number of samples seen beneath a raised surface, such as a table top. From: chosen.
 const BENEATH: usize = 15;
-/// Minimum distance of these samples within the surface's outline and below the surface, metres.
+/// Minimum distances of samples beneath a surface: within its outline, and below it, metres.
 /// From: chosen.
 const BENEATH_M: (f64, f64) = (0.05, 0.08);
 /// Width below which a surface is a rail or the top of a wall, metres. From: chosen.
@@ -51,7 +51,7 @@ const UNDER_M: f64 = 0.25;
 const REACH_M: f64 = 1.2;
 /// Minimum area of the visible floor if nothing stands on the floor, square metres. From: chosen.
 const WIDE_M2: f64 = 2.5;
-/// Maximum height of a requested band that can only mean tables, metres. From: chosen.
+/// Maximum extent of a requested height band that can only mean tables, metres. From: chosen.
 const TELLING_M: f64 = 1.0;
 
 /// Origin of a ray, if known, and its return.
@@ -162,7 +162,8 @@ fn past(surface: &Surface, rays: &[Ray]) -> Option<f64> {
     (count >= PAST_RAYS && share >= PAST_SHARE).then_some(share)
 }
 
-/// Role of a surface that is part of another object, or past whose edge cameras saw.
+/// Role of a surface from its slope, from what it stands on, and from what was seen past its edge;
+/// undecided without such evidence.
 fn supports(
     n: usize,
     surfaces: &[Surface],
@@ -244,7 +245,7 @@ fn level_with_floor(surface: &Surface, surfaces: &[Surface]) -> (Role, Sign) {
     }
 }
 
-/// The boards above a surface.
+/// Outlines and heights of the boards above a surface.
 fn over(surface: &Surface, boards: &[&Surface]) -> Vec<Overhang> {
     let is_over = |s: &&&Surface| s.is_parallel(surface);
     let level = |s: &&Surface| Overhang { above_m: surface.height_m(&s.middle()), hull: s.hull.clone() };
@@ -285,8 +286,7 @@ impl Surface {
         samples.iter().filter(is_beneath).take(BENEATH).count() == BENEATH
     }
 
-    /// True if the lower surface continues around this one: it is seen beside it, with hardly
-    /// anything lower.
+    /// True if the lower surface `other` is seen around this one, with hardly anything lower.
     fn stands_on(&self, other: &Surface, rays: &[Ray]) -> bool {
         if !self.is_parallel(other) {
             return false;

@@ -21,9 +21,9 @@ pub(super) struct Sample {
     pub sigma_m: f64,
 }
 
-/// Sample of the points of a cloud: as many as more views show.
+/// Regular sample of a cloud's points in range; of a single view fewer points are taken.
 pub(super) fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
-    /// However far off a point is measured, metres. From: chosen.
+    /// Maximum standard deviation of a measurement, however far away, metres. From: chosen.
     const WORST_SIGMA_M: f64 = 0.02;
     let wanted = if viewpoints.len() > 1 { SAMPLE } else { SAMPLE_OF_ONE };
     let stride = (cloud.len() / wanted).max(1);

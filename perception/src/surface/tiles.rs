@@ -3,14 +3,15 @@
 use rustc_hash::FxHashMap;
 use std::cell::Cell;
 
-/// Cells along each side of a tile, as a power of two. From: work.
+/// Base-2 logarithm of the number of cells along each side of a tile. From: work.
 const BITS: usize = 3;
+/// Number of cells along each side of a tile. From: work.
 const SIDE: usize = 1 << BITS;
 
-/// Values by cell, with a default. Neighbours are mostly in one tile, so that few tiles are looked
-/// up.
+/// Values by cell, with a default. Successive cells are mostly in one tile, so that few tiles are
+/// looked up.
 pub struct Tiles<T> {
-    /// The start of each tile in `values`.
+    /// Start of each tile in `values`.
     starts: FxHashMap<[i32; 2], usize>,
     /// Most recently used tile, with its start.
     last: Cell<([i32; 2], usize)>,

@@ -1,10 +1,11 @@
 //! Estimates the unknown up direction: the one under which planes are level or upright, and objects
 //! stand on the level ones.
 //!
-//! Every direction that the large planes in view suggest is a hypothesis: a plane may be level, or upright as a wall, alone or with another.
-//! It is as likely as cameras are held so, as most of what was seen lies in planes that are level or upright then, and as what lies in none of
-//! them stands on level ones. A wall seen head-on and a floor seen from straight above are told apart by no more than that; where that is not
-//! enough, nothing is said.
+//! Every direction that the large planes in view suggest is a hypothesis: a plane may be level, or
+//! upright as a wall, alone or with another. The likelihood of a hypothesis depends on how cameras
+//! are usually held, on the share of returns on planes that are then level or upright, and on the
+//! share of the other returns that stand on level planes. A wall seen head-on and a floor seen from
+//! straight above differ in nothing else; where that is not enough, the search fails.
 
 use super::level::{SURE, THINGS_M};
 use super::outline::Outline;
@@ -18,7 +19,7 @@ use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Planes that are sought at most. From: chosen, a shelf has a dozen.
+/// Maximum number of planes that are sought. From: chosen, a shelf has a dozen.
 const PLANES: usize = 12;
 /// Minimum share of the returns on a plane; smaller ones are objects or their pieces. From: chosen.
 const LEAST_SHARE: f64 = 0.0125;
@@ -27,33 +28,42 @@ const LEAST_SHARE: f64 = 0.0125;
 const ALIKE_RAD: f64 = 0.14;
 /// Angle between hypotheses below which they are one, radians. From: chosen, 15°.
 const ONE_RAD: f64 = 0.26;
-/// Minimum probability of the up direction, against all other directions; where the direction is against how
-/// cameras are held, [`SURE`]. From: chosen, more likely than not.
+/// Minimum probability of the up direction, against all other directions; [`SURE`] if the direction
+/// contradicts how cameras are held. From: chosen, more likely than not.
 const LIKELY: f64 = 0.5;
 /// Angle from the cameras' usual attitude beyond which an up direction is implausible, radians.
 /// From: chosen, about 70°.
 const HELD_RAD: f64 = 1.2;
-/// Independent pieces of evidence that all returns make. From: chosen.
+/// Number of independent pieces of evidence that all returns count for. From: chosen.
 const PIECES: f64 = 20.0;
-/// Relative likelihood of returns on planes that are level facing a camera, upright, level facing
-/// away (undersides), and neither, against an arbitrary plane. From: chosen, most of what is built
-/// is level or upright.
+/// Likelihood of returns on level planes that face a camera, relative to an arbitrary plane.
+/// From: chosen, most of what is built is level or upright.
 const LEVEL: f64 = 4.0;
+/// Likelihood of returns on upright planes, relative to an arbitrary plane. From: chosen, most of
+/// what is built is level or upright.
 const UPRIGHT: f64 = 4.0;
+/// Likelihood of returns on level planes that face away from the cameras (undersides), relative to
+/// an arbitrary plane. From: chosen.
 const UNDERSIDE: f64 = 3.0;
+/// Likelihood of returns on planes neither level nor upright, relative to an arbitrary plane.
+/// From: chosen.
 const OBLIQUE: f64 = 0.05;
-/// Prior probability that no requested surface is in view, against one that covers this share of
-/// the returns; and that planes say nothing about up. From: chosen.
+/// Prior probability that no level surface is in view. From: chosen.
 const NO_LEVEL: f64 = 0.1;
+/// Share of the returns on level planes from which on [`NO_LEVEL`] does not count against an up
+/// direction. From: chosen.
 const SHOWN: f64 = 0.2;
+/// Prior probability that planes say nothing about up. From: chosen.
 const SHAPELESS: f64 = 0.2;
-/// Share of the returns off the planes that stand on level ones if up is right, and by chance.
+/// Share of the returns off the planes that stand on level planes if the up direction is right.
 /// From: chosen.
 const STANDS: f64 = 0.8;
+/// Share of the returns off the planes that stand on level planes by chance. From: chosen.
 const ANYHOW: f64 = 0.5;
-/// Effective number of independent pieces of evidence from objects, and the share of returns from
-/// which on it is full. From: chosen.
+/// Number of independent pieces of evidence that the returns off the planes count for.
+/// From: chosen.
 const THINGS: f64 = 10.0;
+/// Share of returns off the planes from which on their evidence counts in full. From: chosen.
 const MANY: f64 = 0.05;
 
 /// Reason the up direction is undecided.
@@ -65,7 +75,7 @@ pub(super) enum Doubt {
     Untold,
 }
 
-/// Up direction in the world, with its probability.
+/// Up direction in the world, with its probability, or the reason it is undecided.
 pub(super) fn up(
     samples: &[Sample],
     seen: &Visibility,
@@ -116,6 +126,7 @@ fn is_level(face: &Face, up: &Vector3<f64>) -> bool {
 struct Face {
     /// Plane with its normal towards the cameras.
     plane: Plane,
+    /// Returns on the plane, world frame, metres.
     members: Vec<Point3<f64>>,
     /// Share of all returns.
     share: f64,
@@ -152,12 +163,12 @@ fn faces(samples: &[Sample], seen: &Visibility, seed: u64) -> (Vec<Face>, Vec<Po
 }
 
 impl Face {
-    /// Marks the points of objects that would stand on the plane if it were level: they begin near
-    /// it and are no taller than objects.
+    /// Marks the points of objects that would stand on the plane if it were level: objects that
+    /// begin near the plane and are no taller than objects are.
     fn carries(&self, places: &[Point3<f64>]) -> Vec<bool> {
-        /// Side of the cells that separate objects, and height above the plane at which an object
-        /// begins, metres. From: chosen.
+        /// Side of the cells that separate objects, metres. From: chosen.
         const CELL_M: f64 = 0.04;
+        /// Maximum height above the plane at which an object begins, metres. From: chosen.
         const FOOT_M: f64 = 0.06;
         let Plane { normal, offset } = self.plane;
         let (a, b) = tangents(&normal);
@@ -195,9 +206,9 @@ struct Things {
 fn ways(faces: &[Face], seen: &Visibility) -> Vec<Unit<Vector3<f64>>> {
     /// Minimum length of a projected direction; shorter ones are undefined. From: chosen.
     const LEAST: f64 = 0.1;
-    /// Number of largest planes of which pairs are taken as walls, and minimum sine between two
-    /// walls. From: chosen.
+    /// Number of largest planes of which pairs are taken as walls. From: chosen.
     const WALLS: usize = 4;
+    /// Minimum sine of the angle between two walls. From: chosen.
     const APART: f64 = 0.9;
     // Upright planes leave open where up is, but for how cameras are held.
     let held = held_up(seen);
@@ -261,20 +272,23 @@ impl Hypothesis {
 /// Log probability of this up direction given how cameras are held, all alike, relative to the
 /// likeliest.
 fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
-    /// Standard deviation of a camera's roll, radians; and probabilities of a quarter or half turn,
-    /// and of any other angle. From: chosen.
+    /// Standard deviation of a camera's roll, radians. From: chosen.
     const ROLLED_RAD: f64 = 0.2;
+    /// Probability of a camera rolled by a quarter or half turn. From: chosen.
     const TURNED: f64 = 0.003;
+    /// Probability of a camera rolled by any other angle. From: chosen.
     const ANY_WAY: f64 = 0.0003;
-    /// Maximum upward pitch of cameras at full probability, radians, standard deviation beyond,
-    /// radians, and minimum log probability. From: chosen.
+    /// Maximum upward pitch of cameras at full probability, radians. From: chosen.
     const RAISED_RAD: f64 = 0.2;
+    /// Standard deviation of a camera's upward pitch beyond [`RAISED_RAD`], radians. From: chosen.
     const RAISED_SPREAD_RAD: f64 = 0.25;
+    /// Minimum log probability of an upward pitch. From: chosen.
     const LEAST_RAISED: f64 = -5.0;
-    /// Downward pitch from which cameras become rarer, radians; the next constants are the width of
-    /// that decline, radians, and the log probability of looking straight down. From: chosen.
+    /// Downward pitch from which cameras become rarer, radians. From: chosen.
     const STEEP_RAD: f64 = 1.1;
+    /// Range of downward pitch over which cameras become rarer, radians. From: chosen.
     const STEEPER_RAD: f64 = 0.3;
+    /// Log probability of looking straight down. From: chosen.
     const STRAIGHT: f64 = -2.0;
     // Rightwards, downwards, and forwards in the image.
     let turns = [(1.0, [0.0, -1.0]), (TURNED, [1.0, 0.0]), (TURNED, [-1.0, 0.0]), (TURNED, [0.0, 1.0])];
@@ -296,7 +310,8 @@ fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
     logs.sum::<f64>() / seen.maps.len().max(1) as f64
 }
 
-/// Up as people and robots hold cameras: against the images' downward axis.
+/// Up direction if cameras are held as usual, against the images' downward axis; `None` if their
+/// attitude is unknown.
 fn held_up(seen: &Visibility) -> Option<Unit<Vector3<f64>>> {
     /// Minimum length of the mean up direction; shorter ones cancel out. From: rounding.
     const CANCELLED: f64 = 1e-6;

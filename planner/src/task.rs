@@ -328,11 +328,11 @@ pub enum Expression {
 /// `start` only.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Timed<T> {
-    /// At start.
+    /// Value for the start.
     pub start: T,
-    /// Over all: the open interval between start and end.
+    /// Value for "over all": the open interval between start and end.
     pub over_all: T,
-    /// At end.
+    /// Value for the end.
     pub end: T,
 }
 
@@ -478,7 +478,7 @@ pub struct Init {
 pub struct TimedInitial {
     /// Time of the change, in seconds from the beginning of the plan.
     pub time_s: f64,
-    /// Change.
+    /// Change that happens.
     pub change: GroundChange,
     /// Span of the literal.
     pub span: Span,

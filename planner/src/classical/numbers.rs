@@ -66,11 +66,11 @@ pub struct Numbers {
     pub changes: Vec<Vec<NumberChange>>,
     /// Comparisons whose truth may change when an operator is applied, by operator.
     turned: Lists<u32>,
-    /// True, by operator, if some number may become undefined or infinite, which makes the operator
-    /// inapplicable.
+    /// True, by operator, if some change may make its number undefined or infinite; in states where it
+    /// does, the operator is inapplicable.
     risky: Vec<bool>,
-    /// True, by operator, if two of its changes of one number may contradict each other, which makes
-    /// the operator inapplicable.
+    /// True, by operator, if two of its changes of one number may contradict each other; in states where
+    /// they do, the operator is inapplicable.
     contradicting: Vec<bool>,
 }
 

@@ -15,9 +15,9 @@ pub(super) const HEAD: usize = 2;
 
 /// Number of conflicts before the first restart, and unit of the Luby sequence after it.
 const RESTART: u64 = 64;
-/// Number of learned clauses, beyond the length of the trail, at which the first ones are deleted.
+/// Initial limit on learned clauses, to which the length of the trail is added.
 const KEPT: usize = 2_000;
-/// Increase, after each deletion, of the number of learned clauses at which the next one happens.
+/// Increase of the limit on learned clauses each time that clauses are deleted.
 const KEPT_MORE: usize = 500;
 /// LBD up to which learned clauses are never deleted.
 const GLUE: u32 = 2;

@@ -169,7 +169,7 @@ pub(super) struct Intervals {
     /// Fact of the first comparison: fact `first + 2 * c` says that comparison `c` holds.
     first: u32,
     numbers: Arc<Numbers>,
-    /// Comparisons that each node changes.
+    /// Comparisons that each node changes, with the change.
     moves: Lists<Move>,
     changes: Lists<NumberChange>,
     /// Nodes whose effects depend on a number, by number.

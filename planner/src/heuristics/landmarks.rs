@@ -281,9 +281,9 @@ impl<'a> Find<'a> {
 /// Maximum number of search steps for cycles among orderings.
 const ORDERING_WORK: usize = 5_000_000;
 
-/// Adds reasonable orders: a landmark comes before another one that would have to be deleted for its
-/// sake, which is a goal or needed at the same time (Hoffmann et al. 2004; Richter and Westphal 2010,
-/// section 4.3). Orders that would close a cycle are left out.
+/// Adds reasonable orders: landmark A comes before landmark B if achieving A would delete B, and B is a
+/// goal or needed together with A (Hoffmann et al. 2004; Richter and Westphal 2010, section 4.3). Orders
+/// that would close a cycle are left out.
 fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<GroundFact>], all: &mut [Landmark]) {
     let exclusions = Exclusions::new(task, mutex_groups, all);
     let initial = |l: &Landmark| l.facts.iter().any(|&f| task.holds(f, &task.initial));
@@ -326,9 +326,9 @@ struct Exclusions<'a> {
     mutex_groups: &'a [Vec<GroundFact>],
     /// Mutex groups that contain a fact, by fact.
     groups_of: Lists<u32>,
-    /// Goal landmark that is a fact, by fact; `u32::MAX` for none.
+    /// Goal landmark of each fact; `u32::MAX` for facts that are no goals.
     goal_of_fact: Vec<u32>,
-    /// Goal landmark on a variable, by variable; `u32::MAX` for none.
+    /// Goal landmark on each variable; `u32::MAX` if no goal is on the variable.
     goal_of_variable: Vec<u32>,
 }
 
@@ -397,7 +397,7 @@ pub(crate) struct Status {
 }
 
 impl Status {
-    /// Status of no states yet.
+    /// Landmark status without any state.
     pub(crate) fn new(landmarks: &Landmarks) -> Status {
         Status { accepted: Rows::new(landmarks.words), scratch: vec![0; landmarks.words] }
     }

@@ -17,7 +17,7 @@ const MOST_REFILLS: f64 = 1000.0;
 /// Number of steps that weigh as much as one unit of cost, in tasks with zero-cost operators.
 const COST_OVER_STEPS: u32 = 64;
 
-/// Operator costs that a heuristic counts.
+/// Way in which a heuristic counts operator costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counting {
     /// Every operator costs one.

@@ -30,7 +30,7 @@ pub struct Improve<'a> {
     touched: Vec<bool>,
     lookahead: Lookahead,
     store: Store,
-    /// Cost of each operator, as improvement counts it.
+    /// Cost of each operator, by [`Counting::CostThenSteps`].
     costs: Vec<u32>,
     queue: BinaryHeap<std::cmp::Reverse<(u64, u32, u32, u32)>>,
     state: Vec<u32>,
@@ -73,7 +73,7 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// Cost of a plan, as improvement counts it.
+    /// Cost of a plan, by [`Counting::CostThenSteps`].
     pub(crate) fn cost(&self, plan: &[u32]) -> u64 {
         plan.iter().map(|&op| u64::from(self.costs[op as usize])).sum()
     }

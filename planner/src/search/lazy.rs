@@ -113,7 +113,7 @@ pub(crate) struct Search<'a, 's> {
     /// Accepted landmarks of each state.
     status: Status,
     counts: Counts,
-    /// Number of open-list entries since memory was last checked.
+    /// Number of open-list entries made since memory was last checked.
     unseen: usize,
     state: Vec<u32>,
     next: Vec<u32>,
@@ -139,7 +139,7 @@ impl Counts {
         self.work += other.work;
     }
 
-    /// Counts since an earlier time, at which they were `before`.
+    /// Increase of the counts since they were `before`.
     pub(crate) fn since(self, before: Counts) -> Counts {
         Counts {
             evaluated: self.evaluated - before.evaluated,
@@ -151,7 +151,7 @@ impl Counts {
 
 /// Number of open-list entries between two checks of the memory limit.
 pub const MOST_UNSEEN: usize = 4096;
-/// Number of entries that one iteration of a search counts as, besides those that it makes.
+/// Number of open-list entries that one iteration counts as, in addition to the entries that it makes.
 pub const UNSEEN_A_ROUND: usize = 16;
 /// Work of generating and storing one state, in units of [`Relaxed::work`].
 const STATE_WORK: u64 = 20;

@@ -121,7 +121,7 @@ pub fn solve(
 const LEAST_WORK: u64 = 5_000_000;
 /// Further work of improving a plan, for each operator of the task.
 const WORK_PER_OPERATOR: u64 = 1500;
-/// Factor on that work for tasks with soft goals, to find plans that satisfy more preferences.
+/// Factor on the work of improvement for tasks with soft goals, to satisfy more preferences.
 const SOFT_SHARE: u64 = 20;
 /// Default work of the first search before the next one is tried.
 pub const FIRST_WORK: u64 = 60_000_000;
@@ -141,8 +141,8 @@ const GREEDY: Strategy = Strategy {
     evaluation_limit: u64::MAX,
 };
 
-/// Turn from which a search without memory ends planning; at earlier turns, other searches may need
-/// less memory.
+/// Turn from which planning ends if a search runs out of memory; at earlier turns, other searches may
+/// need less.
 const LAST_RESORT: usize = ROUNDS[0].len() + 3;
 
 /// A search for a first plan, which can be continued.

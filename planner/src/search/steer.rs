@@ -34,8 +34,8 @@ pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
 }
 
 impl Lookahead {
-    /// Makes the first operator of the relaxed plan applicable that lacks only numeric conditions, and
-    /// applies it; false if there is none.
+    /// Makes one operator of the relaxed plan applicable by changing numbers, and applies it; false if this
+    /// succeeds for none.
     pub(super) fn steer(&mut self, task: &Compiled) -> bool {
         if task.numbers.is_empty() || self.plan.len() >= MOST_STEPS {
             return false;

@@ -65,7 +65,7 @@ const WORK_A_STEP: u64 = 20;
 const WORK_A_STATE: u64 = 50;
 /// Number of open entries between two checks of the memory limit.
 const MOST_UNSEEN: usize = 4096;
-/// Number of open entries that generating one state counts as, besides those that it makes.
+/// Number of open entries that generating one state counts as, in addition to the entries made for it.
 const UNSEEN_A_STATE: usize = 64;
 /// Number of extra turns for the queue of preferred steps after progress (Richter and Westphal 2010).
 const BOOST: i64 = 1000;
@@ -98,7 +98,7 @@ pub(crate) struct Search<'s, 'w, 'a> {
     sequence: u64,
     best_heuristic: f64,
     counts: Counts,
-    /// Number of open entries since memory was last checked.
+    /// Number of open entries made since memory was last checked.
     unseen: usize,
     /// True if something was pruned that might have led to a plan.
     lossy: bool,

@@ -13,8 +13,8 @@ use super::order::{Use, order, uses};
 /// Maximum number of literals in the clauses of one step.
 const MOST_LITERALS: usize = 2_000_000;
 
-/// Literal about step 0 or the state before it, or (`later`) about the state after it; repeated for
-/// every step.
+/// Literal about a step or the state before it, or (`later`) about the state after it; written for step
+/// 0 and repeated for every step.
 #[derive(Clone, Copy, Default)]
 struct Said {
     literal: Literal,

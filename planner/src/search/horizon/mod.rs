@@ -21,7 +21,7 @@ use super::lazy::{Allowed, Counts, End, Shared};
 const ABREAST: usize = 6;
 /// Work of one turn of a horizon, in the unit of [`Solver::work`].
 const TURN_WORK: u64 = 400_000;
-/// Maximum horizon.
+/// Maximum number of steps of a plan.
 const MOST_STEPS: usize = 1_000;
 /// Maximum number of literals of a horizon.
 const MOST_LITERALS: usize = 4_000_000;
@@ -43,7 +43,7 @@ pub struct SatSearch<'a, 's> {
     /// Only plans with search costs below this bound are accepted.
     bound: u32,
     started: bool,
-    /// Encoding of one step; `None` for tasks that have none.
+    /// Encoding of one step; `None` for tasks that the encoding does not cover.
     form: Option<Form>,
     open: Vec<Horizon>,
     /// Number of steps of the next horizon.

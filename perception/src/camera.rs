@@ -27,7 +27,7 @@ pub enum CameraError {
     /// The depth image has another size than the camera.
     #[error("the depth image has {found} pixels where a {width} x {height} camera has {}: check the intrinsics", width * height)]
     Size {
-        /// Number of pixels given.
+        /// Number of pixels of the depth image.
         found: usize,
         /// Number of columns of the camera.
         width: usize,

@@ -121,7 +121,7 @@ impl Cells {
     }
 }
 
-/// True if a point of each cell are within a step of each other; `limit`: square of the step, square metres.
+/// True if a point of one cell is within a step of a point of the other; `limit`: square of the step, square metres.
 fn near(a: &[(Point3<f32>, u32)], b: &[(Point3<f32>, u32)], limit: f32) -> bool {
     a.iter().any(|(p, _)| b.iter().any(|(q, _)| (p - q).norm_squared() <= limit))
 }

@@ -17,8 +17,8 @@ use nalgebra::{
 const BIN_M: f64 = 0.02;
 /// Minimum number of endings that give a sample.
 const FEWEST: usize = 2;
-/// Maximum distance of a sample from its edge in each iteration, metres: where the view cuts the surface off or an
-/// object hides its end, samples lie farther inside.
+/// Maximum distance of an ending from its edge in each iteration, metres: where the view cuts the surface off or an
+/// object hides its end, endings lie farther inside.
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
 /// Standard deviation of a sample, metres; centimetres, because neighbouring samples share their errors.
 const SAMPLE_SIGMA_M: f64 = 0.03;

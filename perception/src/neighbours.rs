@@ -86,9 +86,11 @@ struct Item {
 
 /// Search tree over the finite points of a cloud.
 pub struct Neighbours {
-    /// Coordinates by slot, of which each leaf has `LEAF`; the next two fields too.
+    /// x of the point in each slot; each leaf has `LEAF` slots.
     x: Vec<f32>,
+    /// y of the point in each slot.
     y: Vec<f32>,
+    /// z of the point in each slot.
     z: Vec<f32>,
     /// Index of the point in each slot; `u32::MAX` in padding.
     index: Vec<u32>,

@@ -54,7 +54,8 @@ pub fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     Some(turned.rectangle(turner.origin, (squares / turner.len as f64).sqrt()))
 }
 
-/// True if the best rectangle by rotation has at most the given residual, metres.
+/// True if a rectangle whose sides bound nearly all points has at most the given residual, metres; its edges are not
+/// moved as in [`fit`].
 pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
     if points.len() < 8 {
         return false;
@@ -111,13 +112,17 @@ fn best_turn(
 
 /// Points seen from above, and their coordinates along the sides at the last rotation.
 struct Turner {
-    /// Number of points. Coordinates are relative to the first point, so that single precision suffices, and padded
-    /// with NaN to whole blocks.
+    /// Number of points.
     len: usize,
+    /// x and y of the first point, metres; the coordinates are relative to it, so that single precision suffices.
     origin: [f64; 2],
+    /// x of each point, padded with NaN to whole blocks.
     xs: Vec<f32>,
+    /// y of each point, padded likewise.
     ys: Vec<f32>,
+    /// Coordinates along the rotated x axis at the last rotation, padded likewise.
     us: Vec<f32>,
+    /// Coordinates along the rotated y axis at the last rotation, padded likewise.
     vs: Vec<f32>,
     /// For each block and side, the outermost coordinate of the block's points across the side, as a number that is
     /// less the farther out it lies.
@@ -165,7 +170,7 @@ impl Turner {
     /// the noise.
     fn settled(&self, mut turned: Turned) -> Turned {
         const ROUNDS: usize = 5;
-        /// Minimum share of the points that an edge moves to.
+        /// Minimum share of the points nearest to an edge for the edge to move.
         const LEAST_SHARE: f64 = 0.03;
         for _ in 0..ROUNDS {
             let ([u0, u1], [v0, v1]) = (turned.u, turned.v);

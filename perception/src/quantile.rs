@@ -57,7 +57,7 @@ fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
     *kept.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// Estimate from a sample of a limit that more than `rank` of the mapped values do not exceed.
+/// Estimate, from a sample, of a value that probably more than `rank` of the mapped values do not exceed.
 fn limit(values: &[f64], rank: usize, way: &impl Fn(f64) -> f64) -> f64 {
     /// Number of standard deviations added to a sampled rank as a safety margin. From: work.
     const SAFE: f64 = 3.0;

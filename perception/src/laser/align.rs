@@ -16,8 +16,8 @@ pub struct Alignment {
     pub before: Violation,
     /// Violation at the aligned poses.
     pub after: Violation,
-    /// Objective after alignment, square metres: boundary violation, plus the tie-breaker among poses without
-    /// violation.
+    /// Objective after alignment, square metres: boundary violation, with the tie-breaker of [`Objective::Centred`] if
+    /// that was chosen.
     pub objective_m2: f64,
     /// True if the solver converged; false at the iteration limit.
     pub converged: bool,

@@ -33,9 +33,9 @@ impl Default for ObserveOptions {
 pub enum Ignored {
     /// No cluster of readings is near the expected position.
     NotSeen,
-    /// The object reaches the left end of the field of view, so that LeftBound does not exist.
+    /// The object reaches the left end of the field of view, so that no reading bounds it there (LeftBound).
     NoLeftBound,
-    /// The object reaches the right end of the field of view, so that RightBound does not exist.
+    /// The object reaches the right end of the field of view, so that no reading bounds it there (RightBound).
     NoRightBound,
     /// A nearer object occludes the left end.
     LeftCovered,
@@ -58,7 +58,7 @@ impl std::fmt::Display for Ignored {
     }
 }
 
-/// Scans of one object, as far as they bound it.
+/// Scans that bound one object, and the reasons why others do not.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     /// Scans that bound the object on both sides, posed in the map.

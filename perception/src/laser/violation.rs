@@ -34,8 +34,9 @@ impl Violation {
 struct Part {
     /// Index of the group of rigidly connected scans.
     group: usize,
-    /// Index of the scan's first corner in `Assembly::corners`; the next field is the end.
+    /// Index of the scan's first corner in `Assembly::corners`.
     begin: usize,
+    /// Index behind the scan's last corner.
     end: usize,
     /// True if both bounds are near the object; otherwise the scan may have missed an end, and its points need not
     /// reach the extent seen by others.

@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoticeOptions {
-    /// Distance from every point of the other cloud beyond which a point differs, metres (δ of Eq. 1; paper: 1 cm).
-    /// Three standard deviations of the camera are used instead where they are larger.
+    /// Minimum distance from all points of the other cloud at which a point counts as changed, metres (δ of Eq. 1;
+    /// paper: 1 cm). Three standard deviations of the camera are used instead where they are larger.
     pub delta_m: f64,
     /// Maximum range of changes, metres; farther points are background.
     pub range_m: f64,
@@ -149,9 +149,8 @@ impl MetaRoom {
     /// Points beyond `range_m` are excluded: a distant wall, measured to decimetres, fits anywhere and outvotes points
     /// known to millimetres.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
-        /// Pixel stride that thins views for alignment. Voxel grids are unsuitable: their points
-        /// are attracted to those of another grid, which shifts views held by edges alone by
-        /// centimetres.
+        /// Pixel stride that thins views for alignment. Voxel grids are unsuitable: their points are attracted to those
+        /// of another grid, which shifts views aligned by edges alone by centimetres.
         const EVERY: usize = 6;
         const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;

@@ -27,19 +27,19 @@ pub struct LearnOptions {
     pub supervoxel_m: f32,
     /// Minimum share of a supervoxel's pixels in the object for the supervoxel to stay in it (paper: 25 %).
     pub supervoxel_share: f64,
-    /// Minimum share of a plane in the object for the plane to stay (ϑ_obj of Eq. 3).
+    /// Minimum share of a plane's pixels in the object for the plane to stay part of it (ϑ_obj of Eq. 3).
     pub plane_object_share: f64,
-    /// Share of a plane that must be invisible in the first view for the plane to stay (ϑ_vis of
-    /// Eq. 4).
+    /// Minimum share of a plane's pixels that were invisible in the first view for the plane to stay part of the object
+    /// (ϑ_vis of Eq. 4).
     pub plane_hidden_share: f64,
-    /// Radius around the object within which points are added, metres (paper: 1 cm).
+    /// Radius around the object's points within which neighbouring points are added to it, metres (paper: 1 cm).
     pub radius_m: f32,
     /// Maximum angle between neighbouring normals of one surface, radians (paper: 20 degrees).
     pub angle_rad: f64,
     /// Side of the cubes that hold one model point each, metres (paper: 2 mm).
     pub cube_m: f32,
-    /// True: each model point is the mean of the measurements around it, instead of the single best
-    /// one (beyond the paper).
+    /// True if each model point is the mean of the measurements around it, instead of the single best one (beyond the
+    /// paper).
     pub smooth: bool,
     /// Maximum share of the known object that a view may see through; views above it are left out.
     pub through_share: f64,

@@ -207,7 +207,7 @@ impl Library {
 /// Model at a pose in a view, judged in isolation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hypothesis {
-    /// Recognised object, were it the only one.
+    /// Recognised object, with its confidence regardless of other hypotheses.
     pub recognised: Recognised,
     /// Indices of the view's surface points that the model explains, ascending.
     explained: Vec<u32>,

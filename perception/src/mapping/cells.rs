@@ -45,7 +45,7 @@ pub enum CellsError {
     /// The edge length is not positive and finite.
     #[error("cells with an edge of {edge_m} m: give a positive length, such as 0.1")]
     Edge {
-        /// Given edge.
+        /// Given edge length, metres.
         edge_m: f64,
     },
     /// A stored cell has no points, a sum that is not finite, or occurs twice.
@@ -128,12 +128,12 @@ pub struct NormalOptions {
     /// Minimum number of points of a cube, as a share of those in the fullest cube within `reach`; others are blurred
     /// edges.
     pub least_share: f64,
-    /// Number of cubes on each side of a cube whose centroids form its normal.
+    /// Range of the neighbouring cubes from which a cube's normal is computed, in cubes to each side.
     pub reach: i64,
     /// Minimum number of neighbouring cubes for a normal.
     pub least_regions: usize,
-    /// Minimum ratio of the length of the mean cross product (Eq. 4) to the mean length; below it, the products
-    /// disagree about the direction, and there is no normal.
+    /// Minimum ratio of the length of the mean cross product (Eq. 4) to the products' mean length; below it, the
+    /// products disagree about the direction, and there is no normal.
     pub agreement: f64,
 }
 
@@ -244,8 +244,8 @@ impl Cells {
         found.into_iter().map(|(_, region)| region).collect()
     }
 
-    /// Horizontal positions of the cells in a height band, as spots weighted by points and thinned to `thin_m`, so that
-    /// vertically stacked cells form one spot.
+    /// Plan points of the cells in a height band, weighted by their points and thinned to `thin_m`, so that vertically
+    /// stacked cells form one plan point.
     pub(super) fn plan(&self, band_m: &RangeInclusive<f64>, least_points: u32, thin_m: f64) -> Vec<Spot> {
         let kept = self.sums.iter().filter(|s| s.count >= least_points);
         let at = kept.map(|s| (self.centroid(s), f64::from(s.count)));

@@ -75,8 +75,8 @@ const COARSE: (f64, f64, f64) = (0.2, 0.1, 0.03);
 const SOME: usize = 400;
 /// Standard deviations of the best start pose of the coarse search: position, metres, and heading, radians.
 const START: (f64, f64) = (0.15, 0.05);
-/// Start poses that score within the first value of the best (mean log density) and lie beyond the second from it,
-/// metres, make a fit ambiguous.
+/// Start poses that score within the first value (mean log density) of the best, and lie farther from it than the
+/// second, metres, compete with the fit.
 const RIVAL: (f64, f64) = (0.1, 0.5);
 
 /// Finds loop closures of a drive. `poses`: one per station, chained from pairwise fits.

@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 /// Options for choosing the next pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExploreOptions {
-    /// Field of view of the camera in the plan.
+    /// Horizontal field of view of the camera.
     pub field: FieldOfView,
     /// Clearance of the body's centre from occupied cells, metres.
     pub radius_m: f64,

@@ -20,10 +20,10 @@ pub enum PlaneEstimator {
 /// Prior knowledge of a building (section 4.4), applied when planes are fitted and joined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constraints {
-    /// Walls are upright.
+    /// True if walls are made upright.
     pub upright: bool,
-    /// Direction of most walls' normals, modulo a quarter turn, radians; nearly parallel or
-    /// perpendicular walls are snapped to it.
+    /// Direction of most walls' normals, modulo a quarter turn, radians; nearly parallel or perpendicular walls are
+    /// snapped to it. `None`: no snapping.
     pub main_rad: Option<f64>,
     /// Maximum angle from `main_rad`, modulo a quarter turn, at which a wall is snapped to it, radians.
     pub within_rad: f64,

@@ -94,7 +94,7 @@ const MOST: f64 = 8.0;
 pub(super) struct Spot {
     /// Centroid of the points on the floor plane, metres.
     pub at: Point2<f64>,
-    /// Number of points.
+    /// Number of measured points; in a station's plan at most [`MOST`].
     pub weight: f64,
 }
 

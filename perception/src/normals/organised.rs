@@ -13,7 +13,7 @@ pub struct OrganisedOptions {
     /// Maximum depth difference between a pixel and a neighbour on the same surface, as a share of the depth, but at
     /// least `base_m`.
     pub depth_step_share: f32,
-    /// Least value of this maximum, metres.
+    /// Depth difference up to which neighbours are on the same surface at any depth, metres.
     pub base_m: f32,
     /// Minimum number of pixels of the window on the same surface for a normal.
     pub least: usize,

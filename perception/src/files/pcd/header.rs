@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 /// Encoding of the points, the header's DATA entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PcdEncoding {
-    /// Text, one point a line.
+    /// Text, one point per line.
     Ascii,
     /// Binary, point after point, little endian.
     Binary,

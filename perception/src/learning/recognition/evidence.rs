@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PoseEvidence {
-    /// Number of model points facing the camera, plus back-facing ones with no front before them: points of a visible
-    /// side that was never learned.
+    /// Number of model points facing the camera, plus back-facing points that no learned point hides: these stand for a
+    /// visible side that was never learned.
     pub facing: usize,
-    /// Number of these points with a measured surface of similar normal.
+    /// Number of these points near a measured surface of similar normal.
     pub explained: usize,
     /// Number of facing points that the camera saw through.
     pub through: usize,

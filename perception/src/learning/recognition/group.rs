@@ -18,9 +18,11 @@ pub struct Correspondence<'a> {
 const MATCHES: usize = 300;
 /// Maximum number of matches from which a group is started.
 const SEEDS: usize = 120;
-/// Maximum difference of distances in model and scene between two matches of a group, metres.
+/// Maximum difference, metres, between the distance of two matches in the model and in the scene for the matches to be
+/// in one group.
 const AGREE_M: f32 = 0.01;
-/// Maximum difference of the cosines between normals in model and scene for two matches of a group.
+/// Maximum difference between the cosine of two matches' normals in the model and in the scene for the matches to be in
+/// one group.
 const AGREE_COS: f32 = 0.25;
 /// Minimum distance between two matches of a group in the model, metres; nearer ones are redundant.
 const APART_M: f32 = 0.012;

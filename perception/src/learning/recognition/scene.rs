@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Point3};
 /// View of a scene in the camera frame, as surfels.
 pub struct SceneView {
     pub surfels: Surfels,
-    /// True for points of planes that are wider than any model.
+    /// For each surfel, true if it lies on a plane wider than any model.
     pub wide: Vec<bool>,
     /// The surfels, prepared as the target of registration.
     pub target: Prepared,

@@ -140,8 +140,8 @@ impl Front {
 /// Number of neighbours from which a normal is estimated.
 const NEIGHBOURS: usize = 20;
 
-/// Cloud with outward normals, pointing away from the centre of its bounds. For a body seen from all around that is
-/// nearly convex.
+/// Cloud with outward normals, pointing away from the centre of its bounds. Valid for a nearly convex body seen from
+/// all around.
 ///
 /// # Errors
 /// If there are more points than 32-bit indices can name.

@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 const TURNS: usize = 22;
 /// Number of iterations that fit the four sides.
 const ROUNDS: usize = 5;
-/// Maximum distance of a column from a side that the column influences, in tolerances.
+/// Maximum distance from a side at which a column still attracts the side, in tolerances.
 const PULLS: f64 = 1.5;
 
 /// A column in the frame of the post.

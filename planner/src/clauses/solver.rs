@@ -55,7 +55,7 @@ pub struct Solver {
     pub(super) arena: Vec<u32>,
     learned: Vec<Place>,
     kept: usize,
-    /// By literal: the other literals of binary clauses that contain its negation.
+    /// For each literal, the other literals of the binary clauses that contain its negation.
     pairs: Vec<Vec<Literal>>,
     /// Clauses to inspect when a literal becomes false, by literal.
     watches: Vec<Vec<Watch>>,

@@ -51,8 +51,8 @@ pub struct LandmarkCut {
     /// h_max value of each fact.
     costs: Vec<u32>,
     heap: RadixHeap,
-    /// Zone of each fact in the justification graph of the current cut, as a number that is new for
-    /// every cut.
+    /// Zone of each fact in the justification graph; every cut numbers its zones anew, so that zones of
+    /// earlier cuts are void.
     zones: Vec<u32>,
     stamp: u32,
     stack: Vec<u32>,

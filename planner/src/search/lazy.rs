@@ -260,7 +260,7 @@ impl<'a, 's> Search<'a, 's> {
     }
 
     /// True if a known state is to be visited again: it was never expanded, or is now reached at lower
-    /// cost in a search that counts costs.
+    /// cost in weighted A* or a search with a cost bound.
     fn again(&mut self, id: u32, parent: u32, operator: u32, cost: u32) -> bool {
         let reopens = self.strategy.weight.is_some() || self.strategy.bound != u32::MAX;
         if cost < self.store.cost(id) && reopens {

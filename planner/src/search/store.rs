@@ -28,7 +28,7 @@ pub(crate) struct Store {
     scratch: Vec<u64>,
 }
 
-/// How a state was reached: parent, operator and path cost.
+/// Way in which a state was reached: parent, operator and path cost.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     parent: u32,

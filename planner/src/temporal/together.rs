@@ -40,7 +40,7 @@ pub(super) fn some_only_together(world: &World) -> bool {
 }
 
 /// True if some actions form a cycle in which each holds a resource on which an effect of the next one
-/// acts, as `meets` tells of the held value and the set value.
+/// acts; `meets` decides this from the held value and the value set.
 fn in_a_circle<'w>(
     world: &World<'w>,
     held: &[Vec<Place>],

@@ -1,8 +1,9 @@
 //! Merging and alignment of several views (paper 004, section V, "Point Cloud Merging and
 //! Alignment").
 //!
-//! The paper chains pairwise ICP. Here all views are aligned together, against each other and against where localisation had them, so that
-//! nothing drifts and the merged frame stays the average of what localisation said. A view that cannot be placed is left out and says so.
+//! The paper chains pairwise ICP. Here all views are aligned together, against each other and
+//! against their localised poses, so that nothing drifts and the merged frame stays the average of
+//! the localised poses. A view that cannot be placed is left out, with the reason.
 
 mod align;
 mod check;
@@ -31,7 +32,7 @@ use prepare::{Ready, filter_and_thin};
 /// Merges views into one cloud in the world frame; a single view is only filtered and fused.
 ///
 /// # Errors
-/// If there is no view, no usable point, a pose that is not finite, or an option that means nothing.
+/// If there is no view, no usable point, a pose that is not finite, or an invalid option.
 pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
     pool::within(tracing::debug_span!("merge", views = views.len()), || {
         options.check(views)?;

@@ -63,7 +63,7 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     })
 }
 
-/// Points of each part, in order of its first point.
+/// Groups the points by part, in order of each part's first point.
 fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxel: &[u32]) -> Vec<Segment> {
     let mut counts = vec![0; voxels.len()];
     for (&part, &count) in part_of_voxel.iter().zip(&voxels.counts) {
@@ -118,7 +118,7 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> Placed {
     (indices, points)
 }
 
-/// Points above the surface among consecutive ones, numbered from `from`.
+/// Points above the surface in a chunk of a cloud; `from`: index of the chunk's first point.
 fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, options: &SceneOptions) -> Placed {
     /// Multiple of the surface's standard deviation within which points belong to the surface.
     /// From: chosen.

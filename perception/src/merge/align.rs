@@ -177,7 +177,7 @@ pub(super) fn only_levelled(
     let middle = view.points.iter().fold(Vector3::zeros(), |s, p| s + p.at().coords) / n;
     let (before, after) = (view.prior * Point3::from(middle), pose * Point3::from(middle));
     let turn = pose.rotation * view.prior.rotation.inverse();
-    /// Rotation below which a turn is neglected. From: rounding.
+    /// Minimum norm of the twist's quaternion; below it, the twist is neglected. From: rounding.
     const NO_TURN: f64 = 1e-9;
     // Swing and twist: the twist is the part of the turn about the vertical.
     let along = up.dot(&turn.imag());
@@ -198,8 +198,8 @@ pub(super) struct Objects<'a> {
 }
 
 impl Objects<'_> {
-    /// Places the objects of one view after another onto those already placed, nearest camera
-    /// first.
+    /// Places the objects of one view after another onto those already placed, the view with the
+    /// most similar camera orientation first.
     fn place_all(&self, used: &[bool], levelled: &[Isometry3<f64>], poses: &mut [Isometry3<f64>]) {
         let mut left: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
         let count = |i: usize| self.parts[i].iter().filter(|p| **p == Part::Standing).count();

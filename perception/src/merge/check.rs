@@ -1,4 +1,4 @@
-//! Consistency of views: groups of consistent views, and views that contradict the others.
+//! Consistency of views: whether each fits in with the others.
 
 use super::joint::Found;
 use super::parts::Part;
@@ -11,7 +11,7 @@ use std::fmt;
 /// Fewest matched points for a view to count as overlapping. From: chosen.
 const FEWEST_MATCHED: usize = 80;
 /// Minimum distance between a surface and free space seen by another camera for a contradiction,
-/// metres (the larger of this and the next limit counts). From: chosen.
+/// metres, or [`CLEAR_SPREADS`] standard deviations if they are more. From: chosen.
 pub(super) const CLEAR_M: f64 = 0.03;
 /// Minimum distance for a contradiction, in standard deviations of both measurements. From: chosen,
 /// so that five views of a room with poses 5 cm and 3° off come back together.

@@ -44,7 +44,7 @@ const THING: u32 = u32::MAX - 1;
 /// A return that is fused.
 #[derive(Clone, Copy)]
 pub(super) struct DepthSample {
-    /// Camera frame, metres.
+    /// Position in the camera frame, metres.
     pub at: Vector3<f32>,
     /// Normal in the camera frame; non-finite if unknown.
     pub normal: Vector3<f32>,
@@ -58,7 +58,7 @@ pub(super) struct DepthSample {
 pub(super) struct Looked(Vec<Vec<Vec<DepthSample>>>);
 
 impl Looked {
-    /// Returns of a view at its corrected pose, assigned to these planes.
+    /// Returns of a view at its corrected pose, assigned to `planes`.
     pub fn at(
         view: &View,
         prepared: &Prepared,

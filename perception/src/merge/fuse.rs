@@ -272,7 +272,7 @@ impl Gathered {
     /// Adds returns, in separate passes for each dependent memory access, so that cache misses
     /// overlap.
     fn add(&mut self, returns: &[DepthSample], scale: &Scale, view: u16, colours: Option<&[[u8; 3]]>) {
-        /// Returns that are added together. From: work.
+        /// Number of returns that are added together. From: work.
         const SOME: usize = 512;
         let mut places = [(0, Vector3::zeros()); SOME];
         for returns in returns.chunks(SOME) {

@@ -51,7 +51,7 @@ const MOVED_M: f64 = 0.001;
 #[derive(Default)]
 pub struct Merger {
     kept: Kept,
-    /// The computation that is done ahead of the next view.
+    /// Background computation for the next view.
     ahead: Option<JoinHandle<Kept>>,
 }
 
@@ -98,8 +98,8 @@ impl Merger {
         })
     }
 
-    /// Starts the part of the next merge that depends on the present views alone, in a thread of
-    /// its own. The result is the same without it, only later.
+    /// Starts, in a thread of its own, the part of the next merge that depends on the present views
+    /// alone; without this call the same result comes later.
     pub fn go_ahead(&mut self, views: Vec<View>) {
         let kept = self.kept();
         if kept.base.is_none() && kept.digests.len() == views.len() {

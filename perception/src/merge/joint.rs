@@ -1,7 +1,8 @@
 //! Steps 3 and 4: joint alignment of all views.
 //!
-//! One least-squares problem over all poses: point-to-plane distances between every two views that overlap, and each pose's distance
-//! from where localisation had it. The second part fixes the common frame: it is the robust average of what localisation said.
+//! One least-squares problem over all poses: point-to-plane distances between every two views that
+//! overlap, and each pose's distance from its localised pose. The latter fix the common frame as
+//! the robust average of the localised poses.
 
 use super::parts::Part;
 use super::prepare::{Prepared, Surfel, departure};
@@ -57,10 +58,10 @@ struct Link {
 const LEAST_SIGMA_M: f32 = SHAPE_M as f32;
 /// Number of nearest views that constrain a view. From: chosen.
 pub(super) const PARTNERS: usize = 5;
-/// Smallest cosine between the normals of partners. From: chosen, about 41°.
+/// Minimum cosine between the normals of corresponding points. From: chosen, about 41°.
 const SAME_SIDE: f32 = 0.75;
-/// Allowed excess of a partner's distance over the nearest point's, as a share of the maximum
-/// distance; the surface is much the same there. From: chosen.
+/// Allowed excess of a correspondence's distance over that of the nearest point, as a share of the
+/// maximum distance; the surface is much the same there. From: chosen.
 const SLACK: f32 = 0.1;
 /// Motion of all cameras below which a round ends, metres and radians. From: chosen.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
@@ -129,8 +130,8 @@ impl Askers {
         Askers([Part::Plane, Part::Standing, Part::Around].map(of))
     }
 
-    /// At most about `asked` points per part, evenly spread and different for each partner, with
-    /// weights.
+    /// At most about `asked` points per part with their weights, evenly spread and different for
+    /// each partner view.
     fn some(&self, asked: usize, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f32)> {
         let spread = move |of: &'_ [u32]| {
             let stride = (of.len() / asked.max(1)).max(1);
@@ -148,7 +149,7 @@ struct Asked {
     to: usize,
     /// Query points of the first view, with weights.
     points: Vec<(Surfel, f32)>,
-    /// State of each point's partner.
+    /// Current correspondence of each query point.
     partners: Vec<Partner>,
 }
 
@@ -363,8 +364,8 @@ pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<
     middle * about * middle.inverse()
 }
 
-/// Weight of a camera's prior in the common frame, decreasing with its departure, so that one lost
-/// view does not drag the others.
+/// Weight of a camera's localised pose in the common frame, decreasing with its distance, so that
+/// one lost view does not drag the others.
 fn prior_weight(sigmas: f64) -> f64 {
     /// Distance at which the weight is one half, in standard deviations. From: chosen.
     const HALVED: f64 = 4.0;

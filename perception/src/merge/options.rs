@@ -1,4 +1,4 @@
-//! Options of a merge, and the check of what is given to it.
+//! Options of a merge, and the check of its input.
 
 use super::error::MergeError;
 use crate::surface::Region;

@@ -8,7 +8,7 @@ use crate::surface::{self, Outline};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use rustc_hash::FxHashMap;
 
-/// A plane is dominant from this share of all points. From: chosen.
+/// Minimum share of all points that lie on a dominant plane. From: chosen.
 const DOMINANT: f64 = 0.06;
 /// Minimum cosine between up and the normal of a level plane. From: chosen, about 18°.
 const LEVEL: f64 = 0.95;
@@ -21,8 +21,8 @@ const CELL_M: f64 = 0.05;
 const PLANE: (f64, f64) = (3.0, 0.006);
 /// Minimum cosine between a point's normal and its plane's. From: chosen, about 37°.
 pub(super) const PLANE_FACING: f64 = 0.8;
-/// Minimum number of object points of a view (or, without, of points off the planes) that determine
-/// its pose. From: chosen.
+/// Minimum number of object points of a view, or of points off the planes in a view without
+/// objects, that determine the view's pose. From: chosen.
 pub(super) const FEWEST: usize = 60;
 
 /// Part of the scene that a view's point belongs to.

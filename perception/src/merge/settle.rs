@@ -27,7 +27,7 @@ const VOXEL_SPREAD_M: f32 = 0.003;
 /// as where views are held against each other.
 const CARVE_M: f64 = check::CLEAR_M;
 
-/// Blocks that one thread settles in a row. From: work.
+/// Number of successive blocks that one thread settles. From: work.
 const TOGETHER: usize = 64;
 
 /// A fused point, world frame.
@@ -48,7 +48,7 @@ struct Settled {
 pub(super) struct Before {
     /// Means of the voxels; empty for columns.
     means: Vec<Cell>,
-    /// The settled cells of some blocks in a row, cell by cell.
+    /// Settled cells of each group of successive blocks, in order.
     rows: Vec<Vec<Settled>>,
     /// Number of views that the state was checked against.
     gazes: usize,

@@ -24,8 +24,8 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Grid over a box, with voxels of `voxel_m`, or wider if the box needs more voxels than the
-    /// index has numbers.
+    /// Grid over a box, with voxels of `voxel_m`, or wider ones if the box needs more than [`MOST`]
+    /// voxels along an axis.
     pub fn over(low: &Point3<f64>, high: &Point3<f64>, voxel_m: f64) -> Grid {
         /// Margin of the grid around its bounds, voxels. From: chosen.
         const BORDER: f64 = 4.0;

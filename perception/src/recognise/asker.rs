@@ -142,7 +142,7 @@ impl<'a> Asker<'a> {
 
 /// Removes the cameras that look through a body which better cameras see.
 fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<'a>> {
-    /// Divisor of the number of sampled points: a camera that measures or sees through fewer is not
+    /// Number of sampled points per point that a camera must at least measure or see through to be
     /// judged. From: chosen.
     const EDGE: usize = 8;
     let step = points.len().div_ceil(WITNESSES).max(1);

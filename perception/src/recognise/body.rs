@@ -31,18 +31,18 @@ pub struct Cuboid {
     pub y: f64,
     /// Sine and cosine of the rotation about the vertical.
     pub turn: (f64, f64),
-    /// Lowest corner: from the reference point along the box's two axes, and height above the
-    /// surface, metres.
+    /// Lowest corner: coordinates along the box's own axes from the reference point, then height
+    /// above the surface, metres.
     pub low: [f64; 3],
-    /// Highest corner: from the reference point along the box's two axes, and height above the
-    /// surface, metres.
+    /// Highest corner: coordinates along the box's own axes from the reference point, then height
+    /// above the surface, metres.
     pub high: [f64; 3],
 }
 
 /// A camera ray in the surface's frame.
 #[derive(Clone, Copy, Debug)]
-/// Origin, metres.
 pub struct Ray {
+    /// Origin, metres.
     pub from: [f64; 3],
     /// Shift along the ray per metre of depth.
     pub along: [f64; 3],

@@ -22,12 +22,12 @@ pub struct ColourRange {
     pub hue_deg: Range,
 }
 
-/// Every lightness or saturation. From: derived, all there is.
+/// Whole range of lightness or saturation. From: derived, all there is.
 fn any_share() -> Range {
     Range { low: 0.0, high: 1.0 }
 }
 
-/// Every hue, degrees. From: derived, the whole circle.
+/// Whole range of hue, degrees. From: derived, the whole circle.
 fn any_hue() -> Range {
     Range { low: 0.0, high: 360.0 }
 }
@@ -72,7 +72,7 @@ pub fn coloured(name: &str) -> Option<(&'static str, &str)> {
 pub enum Colour {
     /// A basic colour term.
     Name(&'static str),
-    /// A range of its own.
+    /// A range of colours that the model gives.
     Own(ColourRange),
 }
 

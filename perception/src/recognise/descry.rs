@@ -279,7 +279,7 @@ struct Weighed {
     stances: Vec<Stance>,
 }
 
-/// Minimum probability by cheap measures for a model to be checked by rays. From: chosen.
+/// Probability from the measures above which a model is verified by rays too. From: chosen.
 const DOUBT: f64 = 0.1;
 /// Minimum log likelihood ratio of two bodies against one for splitting a segment. From: derived,
 /// one more round body has five sizes, each told to one part in fifty.
@@ -477,7 +477,7 @@ impl Descry {
         const FLAT: f64 = 0.2;
         /// Share of look-alikes with another taper. From: chosen, a guess.
         const TAPERED: f64 = 0.3;
-        /// Share of look-alikes with other sides. From: chosen, a guess.
+        /// Share of look-alikes of a box with sides of other lengths. From: chosen, a guess.
         const LONGER: f64 = 0.3;
         /// Share of look-alikes of a box with one longer or shorter side; a hidden side leaves this
         /// in doubt. From: chosen, so that an end that no look showed leaves it in doubt.

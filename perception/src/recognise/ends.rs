@@ -90,7 +90,7 @@ const SURE: f64 = 40.0;
 /// Step sizes of the search for a box's sides, metres, and rotation, radians. From: work, a turn
 /// moves the ends of what is 15 cm long by as much.
 const SOUGHT: [(f64, f64); 2] = [(EDGE_M, 0.026), (0.5 * EDGE_M, 0.013)];
-/// Maximum number of steps of each size. From: work.
+/// Maximum number of steps of each size in the search for a box's sides and rotation. From: work.
 const TRIES: usize = 8;
 /// Number of alternations between registering the views and fitting the box. From: work.
 const ROUNDS: usize = 2;

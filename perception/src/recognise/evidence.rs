@@ -291,7 +291,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     Looked { measured, rays }
 }
 
-/// Heights at which silhouettes are looked at, as shares of the body's height. From: chosen.
+/// Height bands in which silhouettes are measured, as shares of the body's height. From: chosen.
 const SILHOUETTES: [(f64, f64); 3] = [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)];
 
 /// Left and right ends of the body's silhouette against free space in each view, at three heights.
@@ -495,7 +495,7 @@ pub(super) struct Protrusion {
     points: usize,
     /// Minimum number of points of a handle.
     least: usize,
-    /// True if the protrusion is as high as a handle and begins above the foot.
+    /// True if the protrusion spans at least the height of a handle and begins above the foot.
     inside_height: bool,
 }
 
@@ -507,7 +507,8 @@ impl Protrusion {
         (base_m, height): (f64, f64),
         far: bool,
     ) -> Option<Protrusion> {
-        /// Heights at which something may stick out, as shares of the body's height. From: chosen.
+        /// Minimum and maximum height of a protrusion's points, as shares of the body's height.
+        /// From: chosen.
         const HEIGHTS: (f64, f64) = (0.08, 1.02);
         /// Number of sectors combined for a protrusion. From: chosen.
         const WINDOW: usize = 3;

@@ -93,7 +93,7 @@ pub(super) fn round_log(range: Option<Range>, m: &Measured) -> f64 {
 }
 
 pub(super) fn diameter_sigma_m(m: &Measured) -> f64 {
-    /// Minimum error, however good the camera, metres. From: chosen.
+    /// Minimum standard deviation of a diameter, however good the camera, metres. From: chosen.
     const LEAST_M: f64 = 0.003;
     (2.0 * m.evidence.radius_sigma_m).hypot(LEAST_M)
 }
@@ -163,7 +163,8 @@ pub(super) fn alike_sides_log(sides: [(f64, f64); 2], m: &Measured) -> f64 {
 /// integral of one whose spread is that of an edge.
 const SIDE_UNIT_M: f64 = EDGE_M * BELL;
 
-/// Log density of both sides in either order; without ray evidence the object is no requested box.
+/// Log density of both sides, either of which may be the first; the minimum without ray evidence of
+/// the sides.
 fn both_sides_log(m: &Measured, [one, other]: [impl Fn(&Side) -> f64; 2]) -> f64 {
     let Some([a, b]) = &m.sides else { return 2.0 * LEAST_DENSITY.ln() };
     let log = |density: f64| density.max(LEAST_DENSITY).ln();
@@ -242,7 +243,7 @@ pub(super) fn handle_log(handle: Handle, m: &Measured) -> f64 {
     const FOUND: f64 = 0.9;
     /// Probability that a handle is found wherever it is, even out of view. From: chosen.
     const STRAY: f64 = 0.02;
-    /// Probabilities that no handle is found where there is none, and that one is found.
+    /// Probabilities, for an object without a handle, that none is found and that one is found.
     /// From: chosen.
     const NEITHER: (f64, f64) = (0.99, 0.01);
     let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);

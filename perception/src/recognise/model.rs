@@ -1,4 +1,4 @@
-//! What an object is like, as an object file says it.
+//! Description of a known object, as read from an object file.
 
 use super::colour::{self, Colour};
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ pub enum Shape {
     Box,
 }
 
-/// What the upper end of the upright object is like.
+/// Kind of upper end of the upright object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Top {
@@ -143,7 +143,7 @@ fn any_taper() -> Range {
     Range { low: 0.7, high: 1.05 }
 }
 
-/// Fault of an object model.
+/// Reason an object model is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A measure that the shape needs is not given.
@@ -173,7 +173,7 @@ pub enum ModelError {
     /// Two models of one name.
     #[error("two objects are called `{object}`: names are what goals speak of, give each its own")]
     Twice {
-        /// The name.
+        /// Name that both models have.
         object: String,
     },
 }

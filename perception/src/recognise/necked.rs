@@ -12,7 +12,7 @@ const NARROWS: f64 = 1.3;
 const BODY: f64 = 0.4;
 /// Upper share of the height, which shows the neck. From: chosen.
 const NECK: f64 = 0.1;
-/// Minimum radius, as a share of the body's, that still belongs below the shoulder. From: chosen.
+/// Minimum radius below the shoulder, as a share of the radius at the foot. From: chosen.
 const SHOULDER: f64 = 0.9;
 /// Minimum share of the lower part's points that lie on its fitted side. From: chosen, more than
 /// half.
@@ -89,7 +89,7 @@ pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: 
 
 /// Radius of a body about an axis between two heights, metres; `None` if too little is visible.
 fn radius_m(of: &Segment, axis: &Round, between_m: std::ops::Range<f64>) -> Option<f64> {
-    /// Minimum number of points. From: chosen.
+    /// Minimum number of points that determine a radius. From: chosen.
     const FEWEST: usize = 8;
     let points = of.points.iter().filter(|p| between_m.contains(&p.z));
     let mut from_axis_m: Vec<f64> = points.map(|p| distance(p.x - axis.x, p.y - axis.y)).collect();

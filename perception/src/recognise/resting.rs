@@ -38,8 +38,8 @@ const LEVEL_SIGMA_M: f64 = PLACE_M;
 /// Minimum number of directions (of 36) in which a vessel must be seen around a body that stands in
 /// it. From: chosen.
 const ALL_AROUND: usize = 27;
-/// Number of directions (of 36) with a level seen right beside the foot from which on that level,
-/// not the bottom of a vessel, is the support. From: chosen.
+/// Minimum number of directions (of 36) in which a level must be seen right beside the foot for
+/// that level, not the bottom of a vessel, to be the support. From: chosen.
 const BORNE: usize = 14;
 /// Height below the top within which points determine the axis, as a share of the height of the
 /// lowest known body. From: chosen.

@@ -19,8 +19,8 @@ use crate::segment::{Segment, VOXEL_ENDS, quantile};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
 
-/// Minimum cosine between an end's normal and the viewing direction for the end to show lid or
-/// inside; errors extend far along the ray otherwise, cosine of 60 degrees. From: chosen.
+/// Minimum cosine (60°) between an end's normal and the viewing direction for the end to show lid
+/// or inside; at flatter angles, errors extend far along the ray. From: chosen.
 const FACING: f64 = 0.5;
 
 /// Measures of an object that may lie, with either end as foot, and the pixels used for each.

@@ -28,7 +28,8 @@ const NEARLY_BY_PLANES: f64 = 100.0;
 /// Aligns the source with the target.
 ///
 /// # Errors
-/// If a cloud is empty, lacks the normals that the method needs, or an option makes no sense. Clouds that do not overlap are no error: see [`Fit::ending`].
+/// If a cloud is empty or lacks the normals that the method needs, or if an option is invalid.
+/// Clouds that do not overlap are no error: see [`Fit::ending`].
 pub fn align(source: &Prepared, target: &Prepared, options: &RegisterOptions) -> Result<Fit, RegisterError> {
     let _span = tracing::debug_span!("register", points = source.points.len()).entered();
     check(source, target, options)?;
@@ -105,7 +106,7 @@ struct Run<'a> {
     /// Source points in tree order, so that consecutive searches are close.
     points: Vec<Point3<f32>>,
     source: &'a Prepared,
-    /// Stride through the points.
+    /// Stride through the points: every `stride`-th is sampled.
     stride: usize,
     /// Correspondence of each sampled point.
     partners: Vec<Partner>,

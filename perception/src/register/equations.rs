@@ -10,7 +10,7 @@ use nalgebra::{
 #[derive(Clone, Copy)]
 pub(crate) struct Sums {
     pub matched: usize,
-    /// Sum of squared residuals, without weights.
+    /// Sum of squared residuals, without weights, square metres.
     pub square: f64,
     /// Upper triangle of the normal matrix, row by row.
     h: [f64; 21],
@@ -120,7 +120,7 @@ impl Sums {
         }
     }
 
-    /// Counts a pair and its squared residual beside [`Sums::add_weighted`].
+    /// Counts a correspondence and its squared residual, which [`Sums::add_weighted`] does not.
     #[inline(always)]
     pub(super) fn count(&mut self, square: f64) {
         self.matched += 1;
@@ -192,7 +192,8 @@ impl Sums {
     }
 }
 
-/// The motion that brings the first of each pair onto the second, by least squares; `None` if the pairs leave a direction free.
+/// Least-squares rigid motion from the first to the second point of each pair; `None` if the pairs
+/// leave a direction free.
 pub(crate) fn rigid(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<f64>> {
     let n = pairs.len() as f64;
     let centre = Point3::from(pairs.iter().map(|p| p.0.coords).sum::<Vector3<f64>>() / n);

@@ -128,7 +128,7 @@ impl Judges {
     /// Score of a circle (centre and radius, metres) for the points seen from above; `None` if not
     /// better than `best`.
     pub fn score(&self, circle: [f64; 3], tolerance: f64, best: f32) -> Option<f32> {
-        /// Penalty of a point inside the circle; less than the half for one outside. From: chosen.
+        /// Penalty of a point inside the circle; a point outside costs a half. From: chosen.
         const INSIDE: f32 = 0.15;
         /// Number of points scored between tests whether the circle can still win. From: work.
         const BLOCK: usize = 16;

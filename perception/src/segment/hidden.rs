@@ -34,13 +34,13 @@ struct Face {
 
 /// Part of the segmentation with its upright faces.
 struct Body {
-    /// Name of the part: one of its voxels.
+    /// Number of the part: one of its voxels.
     name: u32,
     top_m: f64,
     faces: Vec<Face>,
 }
 
-/// Merges parts of one body split by an occluder, under the lower name.
+/// Merges parts of one body split by an occluder, under the lower part number.
 pub(super) fn join(voxels: &Voxels, part_of_voxel: &mut [u32], seen: &Visibility, surface: &Surface) {
     let body = |(name, of): &(u32, Vec<usize>)| Body::of(*name, voxels, of);
     let bodies = pool::heaviest_first(&members(part_of_voxel), |(_, of)| of.len(), body);

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Maximum distance of a patch's voxels from its seed, metres. From: chosen.
 const PATCH_REACH_M: f64 = 0.02;
-/// Maximum angle between a voxel's normal and its patch's, as a cosine (25°). From: chosen.
+/// Minimum cosine between a voxel's normal and that of its patch (25°). From: chosen.
 const PATCH_COS: f64 = 0.906;
 /// Maximum angle of a concave joint that is still smooth, radians (as in locally convex connected
 /// patches). From: chosen, .25 was tried on piles of things and not kept.
@@ -113,7 +113,8 @@ fn thin(voxels: &Voxels) -> Vec<bool> {
     /// Share of a neighbour's points below which a voxel has far fewer points than that neighbour.
     /// From: chosen.
     const SHARE: f64 = 0.25;
-    /// Minimum share of surrounding cells that are fuller by that factor. From: chosen.
+    /// Quantile of the neighbours' numbers of points with which a voxel's own number is compared.
+    /// From: chosen.
     const MOST: f64 = 0.75;
     let is_thin = |i: usize| {
         let own = f64::from(voxels.counts[i]);
@@ -245,7 +246,7 @@ fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
 fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     /// Sine of the angle between normals below which there is no crease. From: rounding.
     const NO_CREASE: f64 = 1e-3;
-    /// Cosine of the least angle between the crease and the line between the centres. From: chosen.
+    /// Maximum cosine between the crease and the line between the patches' centres. From: chosen.
     const ALONG: f64 = 0.85;
     if a.normal == Vector3::zeros() || b.normal == Vector3::zeros() || border.length < 2 {
         return false;
@@ -265,7 +266,7 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     smooth || along < ALONG
 }
 
-/// First voxel of each root patch, after which the part is named.
+/// First voxel of each root patch, which numbers the part.
 fn first_voxels(patch_of: &[u32], joined: &mut Union, patches: usize) -> Vec<u32> {
     let mut first = vec![u32::MAX; patches];
     for (i, &p) in patch_of.iter().enumerate() {

@@ -71,7 +71,8 @@ struct Belonging {
     shortness: u32,
     /// Root of the larger part.
     large: u32,
-    /// Number of joins before each of the two parts was made, to notice later changes.
+    /// Number of joins before each of the two parts was made, which shows whether they have
+    /// changed.
     made: [u32; 2],
 }
 
@@ -84,7 +85,7 @@ impl Belonging {
         own.then_some(Belonging { points: s.points, small, shortness: u32::MAX - length, large, made })
     }
 
-    /// True if neither part has been joined since this was found.
+    /// True if neither part has been joined to another since this pair was found.
     fn is_current(&self, parts: &[Option<Part>]) -> bool {
         let is_same = |part: u32, made| parts[part as usize].as_ref().is_some_and(|p| p.made == made);
         is_same(self.small, self.made[0]) && is_same(self.large, self.made[1])

@@ -277,7 +277,7 @@ fn surfaces(
     })
 }
 
-/// Voxels of each part, ascending, by the part's name (one of its voxels).
+/// Voxels of each part, ascending, by part number.
 pub(super) fn members(part_of_voxel: &[u32]) -> Vec<(u32, Vec<usize>)> {
     let mut counts = vec![0; part_of_voxel.len()];
     part_of_voxel.iter().for_each(|part| counts[*part as usize] += 1);

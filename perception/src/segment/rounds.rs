@@ -21,26 +21,26 @@ use std::collections::{BTreeMap, BTreeSet};
 const RADII_M: (f64, f64) = (0.025, 0.085);
 /// Step of the radii and of the positions, metres. From: derived, so many radii in that range.
 const STEP_M: f64 = (RADII_M.1 - RADII_M.0) / (RADII - 1) as f64;
-/// Maximum distance of a point from the body that still belongs to it, metres. From: chosen, a
-/// millimetre less leaves a piece beside one thing in 32.
+/// Maximum distance of a point from the side of the body that it belongs to, metres. From: chosen,
+/// a millimetre less leaves a piece beside one thing in 32.
 const CLEAR_M: f64 = 0.009;
-/// Distance from the body beyond which a point is no image of the body in a misregistered view,
-/// metres. From: chosen.
+/// Minimum distance from the body of a point that cannot be an image of the body in a misregistered
+/// view, metres. From: chosen.
 const BESIDE_M: f64 = 0.035;
-/// Cosine of the greatest angle between a normal of the side and the direction away from the axis: the faces of a box turn by 45° about theirs.
-/// From: chosen, between 1 and the cosine of 45°.
+/// Minimum cosine between a normal of the side and the direction away from the axis; the normals on
+/// a box's faces turn by up to 45° from it. From: chosen, between 1 and the cosine of 45°.
 const FACING: f64 = 0.9;
-/// Minimum share of the voxels at the radius with radial normals. From: chosen.
+/// Minimum share, of the upright voxels at the radius, of those with normals away from the axis.
+/// From: chosen.
 const ROUND_SHARE: f64 = 0.75;
 /// Minimum number of directions (of 36) around an axis that must show the side. From: chosen.
 const LEAST_SECTORS: usize = 12;
-/// Cosine of the greatest slope of a level face. From: chosen.
+/// Minimum vertical component of the normal of a level face. From: chosen.
 const LEVEL: f64 = 0.8;
 /// Minimum concentration of the normals of a box's sides at right angles (1: all). From: chosen.
 const SQUARE: f64 = 0.55;
 
-/// Separates round bodies from parts, and joins their pieces split by creases. A part is named by
-/// one of its voxels.
+/// Separates round bodies from parts, and joins their pieces split by creases.
 pub(super) fn part(
     voxels: &Voxels,
     points: &[Point3<f64>],
@@ -205,7 +205,7 @@ impl Axis {
     fn sought(votes: &Votes) -> Vec<Axis> {
         /// Maximum number of axes that are tried. From: chosen.
         const MOST: usize = 8;
-        /// Minimum number of own votes of a position and radius, exclusive. From: chosen.
+        /// Number of own votes that a position and radius must exceed. From: chosen.
         const FEW: u16 = 3;
         /// Minimum distance between axes, in steps. From: chosen.
         const APART: f64 = 3.0;
@@ -266,8 +266,8 @@ impl Axis {
         wide.then(|| of.iter().copied().filter(belongs).collect())
     }
 
-    /// True if the body's top continues into the remainder in as many directions as a side must be
-    /// seen from, so that the circle merely cuts the top of a low box.
+    /// True if the body's top continues into the remainder in many directions, so that the circle
+    /// merely cuts the top of a low box.
     fn parts_a_top(&self, voxels: &Voxels, body: &[usize], left: &[Vec<usize>]) -> bool {
         let mut heights: Vec<f64> = body.iter().map(|&v| voxels.centres[v].z).collect();
         let top_m = quantile(&mut heights, VOXEL_ENDS.1);

@@ -67,8 +67,8 @@ pub fn on(parts: &mut [Segment]) -> Vec<f64> {
     tops
 }
 
-/// Height at which another object supports a part, metres: that of the object's points around the
-/// part's foot; `None` if they are seen in too few directions.
+/// Height at which another object supports a part, metres: that of the other object's points around
+/// the part's foot; `None` if these are seen in too few directions.
 fn borne_at_m(outline: &Outline, (place, low): ([f64; 2], f64), other: &[Point3<f64>]) -> Option<f64> {
     /// Quantile of the supporting points that defines the top. From: chosen.
     const TOP: f64 = 0.8;

@@ -231,8 +231,8 @@ impl Fitted {
             && self.beats_box(points, OF_BOX)
     }
 
-    /// True if most of the points lie on the body, nearer than to a box, and determine its
-    /// position.
+    /// True if most of the points lie on the body, much nearer than to a box, and the points
+    /// determine the body's position.
     fn is_placed(&self, points: &[Point3<f64>]) -> bool {
         self.body.inliers >= ON_MOST
             && self.body.place_sigma_m < ONE_PLACE * self.body.radius_m

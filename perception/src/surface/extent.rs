@@ -1,5 +1,5 @@
-//! Extent of a plane under objects that hide it: it continues from its visible part as long as no
-//! camera saw its absence.
+//! Extent of a plane under objects that hide it: the plane continues from its visible part as long
+//! as no camera saw its absence.
 
 use super::connected::parts;
 use super::face::Grid;

@@ -133,8 +133,9 @@ impl Counts {
 
     /// True if the plane cuts a wall or clutter: as many samples lie on either side as near it.
     fn is_slice(&self) -> bool {
-        /// Share of samples on either side from which the plane cuts a body; a body gives a half.
-        /// From: chosen, less than that half.
+        /// Minimum number of samples beside the plane, on the side with fewer, as a share of those
+        /// on the plane, for the plane to cut a body; a body gives a half. From: chosen, less than
+        /// that half.
         const SHARE: f64 = 0.2;
         f64::from(self.beside[0].min(self.beside[1])) > SHARE * f64::from(self.near)
     }
@@ -142,8 +143,9 @@ impl Counts {
     /// True if the plane is merely the foot of something upright: a wall has half as many samples
     /// above as near.
     fn is_foot(&self) -> bool {
-        /// Share of samples above the plane, relative to those near it, from which something
-        /// upright begins there; a wall gives a half. From: chosen, less than that half.
+        /// Minimum number of samples above the plane, as a share of those on the plane, for
+        /// something upright to begin there; a wall gives a half. From: chosen, less than that
+        /// half.
         const SHARE: f64 = 0.35;
         f64::from(self.beside[1]) > SHARE * f64::from(self.near)
     }

@@ -59,7 +59,7 @@ pub enum Sign {
     },
     /// The surface was seen through another one: a mirror image.
     Mirrored,
-    /// The surface is a strip.
+    /// The surface is a narrow strip, such as a rail or the top of a wall.
     Narrow {
         /// Width of the strip, metres.
         width_m: f64,
@@ -174,12 +174,12 @@ impl Surface {
         self.up.dot(&p.coords) - self.offset_m
     }
 
-    /// Predicate for points, given height above the surface, that belong to a board above or its
-    /// load, and so do not stand on this surface.
+    /// Test for points (height above this surface, position in the world) that belong to a board
+    /// above or to its load, and so do not stand on this surface.
     pub(crate) fn overhung(&self) -> impl Fn(f64, &Point3<f64>) -> bool + use<> {
-        /// Thickness of a board with the objects that hide its edge, and overhang of objects beyond
-        /// its hull, metres. From: chosen.
+        /// Thickness of a board with the objects that hide its edge, metres. From: chosen.
         const BOARD_M: f64 = 0.05;
+        /// Overhang of objects beyond a board's hull, metres. From: chosen.
         const MARGIN_M: f64 = 0.03;
         let boards: Vec<(f64, Outline)> =
             self.over.iter().map(|over| (over.above_m, over.outline(&self.up))).collect();

@@ -1,4 +1,4 @@
-//! Points above and below a surface's outline.
+//! Tests whether points lie above or below a surface's outline.
 
 use super::level::Surface;
 use nalgebra::{Point3, Vector3};
@@ -62,8 +62,8 @@ impl Rows {
         Rows { outline, low_m, rows: (0..count).map(row).collect() }
     }
 
-    /// [`Outline::covers`] without a margin, for a point in both the surface's and the outline's
-    /// frame.
+    /// True if a point lies above or below the outline; `flat`: the point in the surface's frame,
+    /// `place`: the same point in the world.
     #[inline(always)]
     pub fn covers(&self, flat: &Point3<f64>, place: &Point3<f64>) -> bool {
         let row = (flat.y - self.low_m) * (1.0 / ROW_M);

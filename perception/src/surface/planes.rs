@@ -71,8 +71,8 @@ pub(crate) fn dominant_planes(
     planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
 }
 
-/// Calls back for at most this many large planes in turn, each fitted without the points of earlier
-/// ones.
+/// Calls `found` for at most `rounds` large planes in turn, each fitted without the points of the
+/// earlier ones.
 pub(super) fn large_planes(
     samples: &[Sample],
     (seed, rounds): (u64, usize),
@@ -310,8 +310,8 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     Some(plane)
 }
 
-/// Least-squares plane through samples weighted by their variances, with its normal on a given
-/// side.
+/// Least-squares plane through samples weighted by their inverse variances, with its normal on a
+/// given side.
 pub(super) fn least_squares<'a>(
     samples: impl Iterator<Item = &'a Sample>,
     side: &Vector3<f64>,
@@ -323,7 +323,7 @@ fn weight(sample: &Sample) -> f64 {
     1.0 / (sample.sigma_m * sample.sigma_m)
 }
 
-/// Variance-weighted sums over samples.
+/// Sums over samples, weighted by their inverse variances.
 #[derive(Default)]
 struct Sums {
     weight: f64,

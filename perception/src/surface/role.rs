@@ -43,7 +43,7 @@ const BENEATH: usize = 15;
 const BENEATH_M: (f64, f64) = (0.05, 0.08);
 /// Width below which a surface is a rail or the top of a wall, metres. From: chosen.
 const NARROW_M: f64 = 0.12;
-/// Minimum height of the camera above the floor, metres. From: chosen.
+/// Minimum mean height of the cameras above a surface that may be the floor, metres. From: chosen.
 const EYE_M: f64 = 0.8;
 /// Minimum height of a supporting surface above the floor, metres. From: chosen.
 const UNDER_M: f64 = 0.25;
@@ -106,8 +106,8 @@ fn assign(surfaces: &mut [Surface], told: Vec<(Role, Sign)>) {
     }
 }
 
-/// Up direction shared by the surfaces, weighted by returns; less for those that lean away from the
-/// hint.
+/// Up direction of the group of parallel surfaces with the most returns; surfaces that lean away
+/// from the hint count less.
 fn level(surfaces: &[Surface], hint: Option<&Unit<Vector3<f64>>>) -> Unit<Vector3<f64>> {
     let upright = |s: &Surface| hint.map_or(1.0, |up| up.dot(&s.up).powi(2));
     let returns = |s: &Surface| -> f64 {

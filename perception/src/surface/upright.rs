@@ -128,7 +128,7 @@ struct Face {
     plane: Plane,
     /// Returns on the plane, world frame, metres.
     members: Vec<Point3<f64>>,
-    /// Share of all returns.
+    /// Share of the returns that lie on the plane.
     share: f64,
 }
 
@@ -196,9 +196,9 @@ impl Face {
 
 /// Returns off all planes.
 struct Things {
-    /// For each plane, the points that would stand on it.
+    /// For each plane, true for each point that would stand on it.
     standing: Vec<Vec<bool>>,
-    /// Share of all returns.
+    /// Share of the returns that lie off all planes.
     share: f64,
 }
 

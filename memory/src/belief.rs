@@ -1,5 +1,5 @@
-//! Belief over objects: number, positions, classes, and the viewpoints behind them. Tracks keep identity:
-//! percepts of later merges are associated with earlier objects.
+//! Belief over objects: how many there are, where, of which class, and from which viewpoints they were seen.
+//! Each object has a *track*, with which percepts of later merged views are associated.
 
 use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Evidence, Percept, probability_of};
@@ -8,23 +8,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::document::RecordId;
 
-/// Gate of the association: a percept farther from a track than this is another object, metres.
+/// Maximum distance between a percept and a track at which both may be one object, metres.
 const GATE_M: f64 = 0.10;
-/// Maximum distance at which a touched object is associated with its former track, metres: the object may
-/// have slid, or the hand may have pushed it.
+/// Maximum distance between a touched object's former track and a new detection that continues the track,
+/// metres: the object may have slid, or the hand may have pushed it.
 pub const MISLAID_M: f64 = 0.25;
-/// Volume ratio from which an unknown object cannot be a known one.
+/// Ratio of volumes above which an unknown percept is too large to be the known object.
 const MUCH_LARGER: f64 = 3.0;
 
-/// Track of an object.
+/// Belief about one object over time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Track {
     /// Number of the track; never reused.
     pub id: u64,
-    /// Symbol of the supporting surface; empty while in the hand.
+    /// Symbol of the supporting surface; empty while the object is in the hand.
     #[serde(default)]
     pub on: String,
-    /// Position: centre of the body's footprint, world frame, metres.
+    /// Centre of the object's footprint, world frame, metres.
     pub position_m: Point3<f64>,
     /// Standard deviation of each coordinate, metres.
     pub position_sigma_m: f64,
@@ -34,33 +34,33 @@ pub struct Track {
     /// known.
     #[serde(default)]
     pub footprint_m: Vec<Point3<f64>>,
-    /// Probability of each known object; with `unknown` they sum to one.
+    /// Probability of being each known object, by name; with `unknown` they sum to one.
     pub probabilities: Vec<(String, f64)>,
-    /// Probability of each kind.
+    /// Probability of being of each kind, by name.
     pub kinds: Vec<(String, f64)>,
     /// Probability of being none of the known objects.
     pub unknown: f64,
-    /// Probability of each basic colour; empty if its colour was not seen.
+    /// Probability of each basic colour, by name; empty if the colour was not seen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub colours: Vec<(String, f64)>,
-    /// Share of the visible hull that some view measured or looked past, 0 to 1.
+    /// Share of the object's visible hull (sides and top) that some view measured or looked past, 0 to 1.
     pub seen_fraction: f64,
     /// Positions of the cameras that saw the object, world frame, metres.
     pub viewpoints_m: Vec<Point3<f64>>,
-    /// Evidence for and against, as of the last merge.
+    /// Evidence for and against the object, from the last merge of views.
     pub evidence: Evidence,
-    /// Records behind the belief.
+    /// Records on which the belief about the object rests.
     pub cites: Vec<RecordId>,
-    /// Time of the first sighting, nanoseconds.
+    /// Time of the first detection, nanoseconds.
     pub first_ns: i64,
-    /// Time of the last sighting, nanoseconds.
+    /// Time of the last detection, nanoseconds.
     pub last_ns: i64,
 }
 
-/// Percept with the cameras that saw it.
+/// A percept with the cameras that saw the object.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighted<'a> {
-    /// Percept.
+    /// Percept of the object.
     pub percept: &'a Percept,
     /// Positions of the cameras that saw the object, world frame, metres.
     pub viewpoints_m: &'a [Point3<f64>],
@@ -73,29 +73,30 @@ pub struct Sighted<'a> {
 pub struct Belief {
     /// Tracks, ordered by first sighting.
     pub tracks: Vec<Track>,
-    /// Former tracks that are no longer seen: removed, or false detections.
+    /// Tracks that later views no longer show: removed objects, or false detections.
     pub gone: Vec<Track>,
-    /// Tracks that were touched and not seen since; a new detection of the same kind nearby continues such a
-    /// track.
+    /// Tracks of objects that were touched and not seen since; a new detection of the same kind nearby
+    /// continues such a track.
     #[serde(default)]
     pub mislaid: Vec<Track>,
     next_id: u64,
 }
 
 impl Track {
-    /// Probability of being the known object, or of being of the kind, called `name`, which may begin with a colour; 0 for a name
-    /// without a model.
+    /// Probability that the object is the known object, or is of the kind, called `name`; a colour may stand
+    /// before the kind. 0 for a name without a model.
     pub fn probability_of(&self, name: &str) -> f64 {
         probability_of(name, [&self.probabilities, &self.kinds], &self.colours)
     }
 
-    /// The most probable known object; none: unknown.
+    /// Name of the most probable known object; `None` if *unknown* is more probable.
     pub fn label(&self) -> Option<&str> {
         let best = self.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         (best.1 > self.unknown).then_some(best.0.as_str())
     }
 
-    /// The most probable kind; none: of no known kind. What is like a known object but of another colour is of its kind.
+    /// Name of the most probable kind; `None` if it is more probable that the object is of no known kind. An
+    /// object that is like a known one but of another colour is of that one's kind.
     pub fn kind(&self) -> Option<&str> {
         let best = self.kinds.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let all = |list: &[(String, f64)]| list.iter().map(|(_, p)| p).sum::<f64>();
@@ -103,28 +104,27 @@ impl Track {
         (best.1 > self.unknown - recoloured).then_some(best.0.as_str())
     }
 
-    /// True if views may have blurred the object into another one over its place, a much larger
-    /// unknown object.
+    /// True if this object is known, and a percept with this label and size is unknown and so much larger
+    /// that blurred views may have merged the object into it.
     pub fn may_be_blurred_into(&self, label: Option<&str>, size_m: &[f64; 3]) -> bool {
         let volume = |size_m: &[f64; 3]| size_m.iter().product::<f64>();
         self.label().is_some() && label.is_none() && volume(size_m) > MUCH_LARGER * volume(&self.size_m)
     }
 
-    /// Certainty of the object's class, *none of the known* included, 0 to 1. Members of a kind
-    /// count together.
+    /// Probability of the most probable class: a kind, whose members count together, or *none of the known
+    /// objects*.
     pub fn certainty(&self) -> f64 {
         self.kinds.iter().map(|&(_, p)| p).fold(self.unknown, f64::max)
     }
 }
 
 impl Belief {
-    /// Updates the tracks of a surface from the merge of all its views: percepts are assigned to
-    /// tracks by minimum total distance within the gate; unassigned tracks are gone. Tracks on
-    /// other surfaces stay unchanged.
+    /// Updates the tracks on a surface from the merge of all views of it: percepts are assigned to tracks by
+    /// minimum total distance within the gate [`GATE_M`]; unassigned tracks are gone. Tracks on other
+    /// surfaces stay unchanged.
     ///
     /// Percepts rest on every view of the surface so far, so their probabilities replace the earlier ones. A
-    /// known object that a larger unknown one has absorbed, because the last view blurs the two, keeps its
-    /// track.
+    /// known object that blurred views have merged into a larger unknown percept keeps its track.
     pub fn update(&mut self, on: &str, sighted: &[Sighted<'_>], stamp_ns: i64, cites: &[RecordId]) {
         let (here, elsewhere) = std::mem::take(&mut self.tracks).into_iter().partition(|t| t.on == on);
         self.tracks = here;
@@ -163,7 +163,7 @@ impl Belief {
         }
     }
 
-    /// Marks a track as mislaid: the object was touched, so that its position is unknown until it
+    /// Moves a track to `mislaid`: its object was touched, so that the position is unknown until the object
     /// is seen again.
     pub fn mislay(&mut self, id: u64) {
         if let Some(at) = self.tracks.iter().position(|t| t.id == id) {
@@ -180,8 +180,8 @@ impl Belief {
         Some(self.mislaid.remove(nearest))
     }
 
-    /// Assignment of percepts to tracks at the least total distance within the gate, with the unassigned
-    /// percepts.
+    /// Assigns percepts to tracks at the least total distance within the gate [`GATE_M`]; also returns the
+    /// unassigned percepts.
     fn associate(&self, sighted: &[Sighted<'_>]) -> Association {
         let (rows, columns) = (self.tracks.len(), sighted.len());
         let mut tracks = vec![None; rows];
@@ -210,7 +210,7 @@ struct Association {
     new: Vec<usize>,
 }
 
-/// True if a percept is a much larger unknown object over a known object's place.
+/// True if a percept is unknown, much larger than the object of a track, and covers the place of that object.
 fn swallows(percept: &Percept, track: &Track) -> bool {
     let reach_m = percept.size_m[0].max(percept.size_m[1]) / 2.0;
     track.may_be_blurred_into(percept.label.as_deref(), &percept.size_m)

@@ -10,21 +10,21 @@ use std::borrow::Cow;
 /// Name of a cloud's blob.
 pub(crate) const CLOUD: &str = "cloud";
 
-/// The sensor behind a cloud, and the uncertainty of its pose.
+/// Camera behind a cloud, and the uncertainty of its pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sensing {
-    /// The camera, if known.
+    /// Intrinsics of the camera, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<Intrinsics>,
-    /// Standard deviation of its position along each axis, metres.
+    /// Standard deviation of the camera position along each axis, metres.
     #[serde(default)]
     pub pose_sigma_m: f64,
-    /// Standard deviation of its orientation about each axis, radians.
+    /// Standard deviation of the camera orientation about each axis, radians.
     #[serde(default)]
     pub pose_sigma_rad: f64,
 }
 
-/// Memory layout of a cloud's points.
+/// Byte layout of the points of a cloud.
 #[derive(Serialize, Deserialize)]
 pub struct Layout {
     points: usize,
@@ -44,10 +44,13 @@ struct LayoutField {
     kind: String,
 }
 
-/// Names, type and size of each part of a point, in order; colours take four bytes, the last always 255.
+/// Position of a point: names, type and size in bytes of its fields.
 const POSITION: (&[&str], &str, usize) = (&["x", "y", "z"], "f32", 4);
+/// Colour of a point: names, type and size in bytes of its fields; alpha is always 255.
 const COLOUR: (&[&str], &str, usize) = (&["red", "green", "blue", "alpha"], "u8", 1);
+/// Normal of a point: names, type and size in bytes of its fields.
 const NORMAL: (&[&str], &str, usize) = (&["normal_x", "normal_y", "normal_z"], "f32", 4);
+/// Label of a point: name, type and size in bytes of its field.
 const LABEL: (&[&str], &str, usize) = (&["label"], "u32", 4);
 
 pub fn layout(cloud: &Cloud, sensing: &Sensing) -> Layout {
@@ -68,7 +71,7 @@ pub fn layout(cloud: &Cloud, sensing: &Sensing) -> Layout {
     Layout { points: cloud.len(), stride, fields, grid: cloud.grid, sensing: *sensing }
 }
 
-/// Encodes a cloud as a blob; a cloud of bare points is not copied.
+/// Encodes a cloud as a blob; a cloud with positions alone is not copied.
 pub fn encode<'a>(cloud: &'a Cloud, sensing: &Sensing) -> Blob<'a> {
     let layout = layout(cloud, sensing);
     let bare = layout.fields.len() == 3 && cfg!(target_endian = "little");
@@ -97,19 +100,19 @@ pub fn pack(cloud: &Cloud, stride: usize) -> Vec<u8> {
     out
 }
 
-/// Decodes the sensor behind a cloud.
+/// Decodes the camera behind a cloud.
 ///
 /// # Errors
-/// A description of the mismatch in the layout.
+/// Reason for which the layout cannot be read.
 pub fn sensing(info: &BlobInfo) -> Result<Sensing, String> {
     let layout = Layout::deserialize(&info.layout);
     layout.map(|l| l.sensing).map_err(|e| format!("its layout cannot be read: {e}"))
 }
 
-/// Decodes a cloud from its blob.
+/// Decodes a cloud and the camera behind it from a blob.
 ///
 /// # Errors
-/// A description of the mismatch in the layout.
+/// Reason for which the layout cannot be read, or does not match the data.
 pub fn decode(info: &BlobInfo, data: &[u8]) -> Result<(Cloud, Sensing), String> {
     let layout: Layout =
         Layout::deserialize(&info.layout).map_err(|e| format!("its layout cannot be read: {e}"))?;

@@ -1,4 +1,4 @@
-//! Documents: the JSON part of a record, with blobs beside it.
+//! Documents: the JSON part of a record, which also describes the blobs (byte arrays) stored with it.
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
@@ -19,9 +19,9 @@ impl std::fmt::Display for RecordId {
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
-    /// Minimum corner.
+    /// Minimum corner, metres.
     pub min_m: [f64; 3],
-    /// Maximum corner.
+    /// Maximum corner, metres.
     pub max_m: [f64; 3],
 }
 
@@ -37,11 +37,11 @@ impl Bounds {
 pub struct Sighting {
     /// The object's name.
     pub object: String,
-    /// Probability or score, 0 to 1.
+    /// Confidence in the sighting: a probability or a score, 0 to 1.
     pub confidence: f64,
 }
 
-/// Metadata of a record beside its content, by which queries find it.
+/// Content of a record, with the metadata by which queries find the record.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Meta {
     /// Position of the sensor, world frame, metres.
@@ -50,11 +50,11 @@ pub struct Meta {
     pub covers_m: Option<Bounds>,
     /// Objects that the record mentions.
     pub objects: Vec<Sighting>,
-    /// Content in any other form.
+    /// Further content, as JSON.
     pub body: Value,
 }
 
-/// Form of a blob, which determines the schema for viewers.
+/// Form of a blob's content, which determines its schema for viewers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
@@ -76,7 +76,7 @@ pub enum Form {
     Grid,
     /// Projection of a camera (`foxglove.CameraCalibration`).
     CameraCalibration,
-    /// Bytes in no format that viewers know (`descry.Blob`).
+    /// Bytes in a format that no viewer knows (`descry.Blob`).
     Bytes,
 }
 
@@ -85,11 +85,11 @@ pub enum Form {
 pub struct BlobInfo {
     /// Name within the record.
     pub name: String,
-    /// Form.
+    /// Form of the content.
     pub form: Form,
     /// Length, bytes.
     pub bytes: u64,
-    /// Layout: fields and stride of a cloud, size and encoding of an image.
+    /// Layout of the content: fields and stride of a cloud, size and encoding of an image.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     pub layout: Value,
 }
@@ -99,7 +99,7 @@ pub struct BlobInfo {
 /// Fields that a newer format adds are ignored by older readers, fields that an older format lacked take their default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Document {
-    /// Number.
+    /// Number of the record.
     pub id: RecordId,
     /// Kind: `cloud`, `scan`, `image`, `transforms`, `log`, or any word.
     pub kind: String,
@@ -108,10 +108,10 @@ pub struct Document {
     /// End of the time span, for records of a span, nanoseconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_ns: Option<i64>,
-    /// The coordinate frame of the content; for transforms the child frame.
+    /// Coordinate frame of the content; the child frame for transforms.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub frame: String,
-    /// Robot of the record, in a store shared by several.
+    /// Name of the recording robot, in a store shared by several.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub robot: String,
     /// Position of the sensor, world frame, metres.
@@ -123,13 +123,13 @@ pub struct Document {
     /// Objects that the record mentions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Sighting>,
-    /// True if never pruned, because the recording cannot be understood without this record.
+    /// True if the record is never pruned, because the recording cannot be understood without it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub kept: bool,
-    /// Content.
+    /// Content, as JSON.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     pub body: Value,
-    /// Blobs.
+    /// Descriptions of the record's blobs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blobs: Vec<BlobInfo>,
 }
@@ -139,26 +139,26 @@ pub struct Document {
 pub struct Blob<'a> {
     /// Name within the record.
     pub name: String,
-    /// Form.
+    /// Form of the content.
     pub form: Form,
-    /// See [`BlobInfo::layout`].
+    /// Layout of the content, as [`BlobInfo::layout`].
     pub layout: Value,
-    /// Bytes.
+    /// Bytes of the content.
     pub data: Cow<'a, [u8]>,
 }
 
 /// A record to be stored.
 #[derive(Clone, Debug)]
 pub struct Draft<'a> {
-    /// Kind.
+    /// Kind: `cloud`, `scan`, `image`, `transforms`, `log`, or any word.
     pub kind: String,
     /// Time stamp, nanoseconds; not negative.
     pub stamp_ns: i64,
     /// End of the time span, for records of a span, nanoseconds.
     pub end_ns: Option<i64>,
-    /// The coordinate frame, or "".
+    /// Coordinate frame of the content, or "".
     pub frame: String,
-    /// True if it is never pruned.
+    /// True if the record is never pruned.
     pub kept: bool,
     /// Content, and the metadata by which queries find it.
     pub meta: Meta,
@@ -167,7 +167,7 @@ pub struct Draft<'a> {
 }
 
 impl Draft<'_> {
-    /// An empty record of a kind and time.
+    /// Creates an empty draft of a kind and a time stamp in nanoseconds.
     pub fn new(kind: &str, stamp_ns: i64) -> Self {
         Draft {
             kind: kind.into(),
@@ -185,15 +185,16 @@ impl Draft<'_> {
         self.end_ns.unwrap_or(self.stamp_ns)
     }
 
-    /// True if the record changes pins: it is written even without room, since it may free some.
+    /// True if the record adds or removes pins, which protect records from pruning. It is written even
+    /// without room, since it may free some.
     pub(crate) fn is_of_pins(&self) -> bool {
         [crate::stores::PIN, crate::stores::UNPIN].contains(&self.kind.as_str())
     }
 
-    /// The document as it will be stored.
+    /// Converts the draft to the document that will be stored.
     ///
     /// # Errors
-    /// [`Error::Input`] if a part of it could not be found or read again.
+    /// [`Error::Input`] if a part of the draft could not be found or read again.
     pub(crate) fn document(&self, id: RecordId, robot: &str) -> Result<Document, Error> {
         self.check()?;
         let blobs = self.blobs.iter().map(|b| BlobInfo {
@@ -258,9 +259,9 @@ impl Draft<'_> {
 /// A ball in the world, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Near {
-    /// Centre.
+    /// Centre, world frame, metres.
     pub place_m: [f64; 3],
-    /// Radius.
+    /// Radius, metres.
     pub radius_m: f64,
 }
 
@@ -277,21 +278,21 @@ pub enum Order {
 /// Conditions of a query; all that are given must hold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Query {
-    /// Kind of the records; none: any.
+    /// Kind of the records; `None` for any.
     pub kind: Option<String>,
-    /// Coordinate frame; none: any.
+    /// Coordinate frame of the records; `None` for any.
     pub frame: Option<String>,
-    /// Robot of the records.
+    /// Name of the recording robot; `None` for any, or for the robot of a store that serves one alone.
     pub robot: Option<String>,
-    /// Earliest stamp, nanoseconds; a span counts until its end.
+    /// Earliest stamp, nanoseconds; a record of a time span matches if the span ends later.
     pub from_ns: Option<i64>,
     /// Latest stamp, nanoseconds.
     pub to_ns: Option<i64>,
-    /// Ball that holds the sensor.
+    /// Ball that contains the position of the sensor.
     pub seen_from: Option<Near>,
-    /// Ball that the covered extent meets.
+    /// Ball that meets the extent covered by the record.
     pub covers: Option<Near>,
-    /// Object that the records mention.
+    /// Name of an object that the records mention.
     pub object: Option<String>,
     /// Minimum confidence in that object, or in any object if none is given.
     pub min_confidence: Option<f64>,
@@ -299,7 +300,8 @@ pub struct Query {
     pub order: Order,
     /// Maximum number of results.
     pub limit: Option<usize>,
-    /// Stamp and number of the record after which results begin, in the query's order: for reading in pages.
+    /// Stamp, nanoseconds, and number of the record after which results begin, in the query's order: for
+    /// reading in pages.
     pub after: Option<(i64, RecordId)>,
 }
 

@@ -72,10 +72,10 @@ pub enum Error {
         place: PathBuf,
         /// Offset in the file.
         at: u64,
-        /// Found and expected bytes.
+        /// Description of the damage.
         what: String,
     },
-    /// A record with losses must not be continued: the rest would be mistaken for the whole.
+    /// A damaged record cannot be continued, since it would then be mistaken for a whole one.
     #[error(
         "{place} is damaged, so that it can be read as far as it is whole and not be gone on with{}\n  \
          put back what is missing from a copy, or begin anew elsewhere; `descry export` writes what is whole to a file",
@@ -84,10 +84,10 @@ pub enum Error {
     Faulty {
         /// The folder.
         place: PathBuf,
-        /// Losses.
+        /// Damage that was found.
         faults: Vec<Fault>,
     },
-    /// The index failed.
+    /// The index of the record failed.
     #[error("the index of {place}: {because}")]
     Index {
         /// Folder of the record.
@@ -103,7 +103,7 @@ pub enum Error {
         /// Reason.
         because: String,
     },
-    /// The data cannot be recorded.
+    /// The data cannot be recorded as given.
     #[error("{what}: {mend}")]
     Input {
         /// Fault of the data.
@@ -111,37 +111,37 @@ pub enum Error {
         /// Remedy.
         mend: String,
     },
-    /// No such record, or one that was pruned.
+    /// The record does not exist, or was pruned.
     #[error("there is no record {id}: it was pruned or never written; pin what must stay")]
     Missing {
-        /// Number asked for.
+        /// Number of the requested record.
         id: u64,
     },
-    /// A record without such a blob.
+    /// The record has no such blob.
     #[error("record {id} ({kind}) has no blob `{name}`; it has: {has}")]
     NoBlob {
-        /// The record.
+        /// Number of the record.
         id: u64,
-        /// Kind.
+        /// Kind of the record.
         kind: String,
-        /// The blob asked for.
+        /// Name of the requested blob.
         name: String,
-        /// Blobs.
+        /// Names of the blobs that the record has.
         has: String,
     },
-    /// No record within the time tolerance.
+    /// No record is within the time tolerance.
     #[error("no {what} within {:.3} s of {stamp_ns} ns{}", *tolerance_ns as f64 * 1e-9, nearest_text(*nearest_ns, *stamp_ns))]
     NotNear {
-        /// Subject of the search.
+        /// Requested kind of record, and its frame if one was requested.
         what: String,
-        /// Time asked for, nanoseconds.
+        /// Requested time, nanoseconds.
         stamp_ns: i64,
         /// Tolerance, nanoseconds.
         tolerance_ns: i64,
-        /// Stamp of the nearest record, nanoseconds.
+        /// Stamp of the nearest record, nanoseconds; `None` if there is none at all.
         nearest_ns: Option<i64>,
     },
-    /// The transform tree has no answer for that time.
+    /// The transform tree has no answer for the requested time.
     #[error(transparent)]
     Transform(#[from] crate::transforms::TransformError),
     /// An earlier background write failed; its data was not acknowledged.
@@ -156,7 +156,7 @@ fn listed(faults: &[Fault]) -> String {
     faults.iter().map(|fault| format!("\n  {fault}")).collect()
 }
 
-/// Megabytes, rounded up to a tenth.
+/// Size in megabytes, rounded up to a tenth.
 fn megabytes(bytes: u64) -> String {
     format!("{:.1} MB", (bytes as f64 / 1e5).ceil() / 10.0)
 }

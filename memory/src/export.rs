@@ -6,14 +6,15 @@ use crate::stores::local::segment::{Encoded, Segment};
 use crate::stores::{Fault, Store};
 use std::path::Path;
 
-/// Limits of a chunk: number of records, and bytes.
+/// Maximum number of records in a chunk.
 const CHUNK_RECORDS: usize = 256;
+/// Size of a chunk, bytes, from which the next one begins.
 const CHUNK_BYTES: usize = 4 << 20;
 
 /// Counts of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Exported {
-    /// Records.
+    /// Number of exported records.
     pub records: u64,
     /// Length of the file, bytes.
     pub bytes: u64,
@@ -21,7 +22,7 @@ pub struct Exported {
     pub faults: Vec<Fault>,
 }
 
-/// Writes the undamaged results of a query, oldest first whatever its order, into a new MCAP file.
+/// Writes the undamaged results of a query into a new MCAP file, oldest first whatever the query's order.
 ///
 /// # Errors
 /// If the file exists or cannot be written, or the store cannot be read.
@@ -44,7 +45,7 @@ pub fn export(store: &dyn Store, query: &Query, path: &Path) -> Result<Exported,
     Ok(exported)
 }
 
-/// Records of the next chunk.
+/// Records that are collected for the next chunk.
 #[derive(Default)]
 struct Batch {
     records: Vec<(Document, Vec<Vec<u8>>)>,

@@ -1,4 +1,5 @@
-//! Background writer of grouped transforms; callers that record measurements do not wait for the disk.
+//! Background writer of transforms in groups, so that callers that record measurements do not wait for the
+//! disk.
 
 use crate::document::{Blob, Draft, Form, Meta};
 use crate::error::Error;
@@ -11,7 +12,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-/// Transforms of one link over a time span.
+/// Transforms between one pair of frames over a time span.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
     pub parent: String,
@@ -20,7 +21,7 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    /// Converts the group to a document in the child's frame, from its first stamp to its last.
+    /// Converts the group to a document of a kind, in the child's frame and from the first stamp to the last.
     pub fn draft(&self, kind: &str) -> Draft<'static> {
         let first = self.samples.iter().map(|s| s.stamp_ns).min().unwrap_or(0);
         let last = self.samples.iter().map(|s| s.stamp_ns).max().unwrap_or(0);
@@ -43,7 +44,7 @@ impl Group {
     }
 }
 
-/// Number of batches that may wait for the disk; further writers wait. Bounds the memory.
+/// Maximum number of batches that wait for the disk, which bounds the memory; further writers block.
 const WAITING: usize = 4;
 
 enum Job {
@@ -51,14 +52,14 @@ enum Job {
     Drain(SyncSender<()>),
 }
 
-/// Batches that could not be written, with the reason; they are kept for a retry.
+/// Groups that could not be written, kept for a retry, and the reason.
 #[derive(Default)]
 struct Failed {
     groups: Vec<Group>,
     because: Option<Error>,
 }
 
-/// The writing thread.
+/// Thread that writes groups of transforms, and its queue.
 pub(crate) struct Flusher {
     jobs: Option<SyncSender<Job>>,
     failed: Arc<Mutex<Failed>>,
@@ -81,7 +82,7 @@ impl Flusher {
         }
     }
 
-    /// Enqueues groups; blocks only if `WAITING` batches are queued.
+    /// Enqueues groups to be written; blocks only while [`WAITING`] batches are queued.
     pub fn send(&self, groups: Vec<Group>) {
         if groups.is_empty() {
             return;
@@ -95,7 +96,7 @@ impl Flusher {
         }
     }
 
-    /// True if a write has failed.
+    /// True if a write has failed and its groups are still to be written.
     pub fn has_failed(&self) -> bool {
         lock(&self.failed).because.is_some()
     }

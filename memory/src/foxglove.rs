@@ -14,7 +14,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::Value;
 use wire::{Field, Wire, WireReader};
 
-/// A message schema, as declared by a segment.
+/// A message schema, as declared in an MCAP file.
 pub(crate) struct Schema {
     pub name: &'static str,
     pub encoding: &'static str,
@@ -26,13 +26,13 @@ pub const PROTOBUF: &str = "protobuf";
 /// MCAP's name for the encoding of documents.
 pub(crate) const JSON: &str = "json";
 
-/// The JSON schema of documents: the common fields, open to others.
+/// JSON schema of documents: the common fields; others are allowed.
 pub(crate) fn document_schema() -> Schema {
     let text = r#"{"title":"descry.Document","type":"object","required":["id","kind","stamp_ns"],"properties":{"id":{"type":"integer"},"kind":{"type":"string"},"stamp_ns":{"type":"integer"},"end_ns":{"type":"integer"},"frame":{"type":"string"},"robot":{"type":"string"},"seen_from_m":{"type":"array","items":{"type":"number"}},"covers_m":{"type":"object","properties":{"min_m":{"type":"array","items":{"type":"number"}},"max_m":{"type":"array","items":{"type":"number"}}}},"objects":{"type":"array","items":{"type":"object","properties":{"object":{"type":"string"},"confidence":{"type":"number"}}}},"body":{},"blobs":{"type":"array","items":{"type":"object","properties":{"name":{"type":"string"},"form":{"type":"string"},"bytes":{"type":"integer"},"layout":{"type":"object"}}}}}}"#;
     Schema { name: "descry.Document", encoding: "jsonschema", data: text.as_bytes().to_vec() }
 }
 
-/// The schema for blobs of a form.
+/// Schema for blobs of a form.
 pub(crate) fn schema(form: Form) -> Schema {
     let name = match form {
         Form::PointCloud => "foxglove.PointCloud",
@@ -49,7 +49,7 @@ pub(crate) fn schema(form: Form) -> Schema {
     Schema { name, encoding: PROTOBUF, data: descriptor::set(name) }
 }
 
-/// The topic of a blob.
+/// Topic of a blob in an MCAP file.
 pub(crate) fn topic(document: &Document, blob: &BlobInfo) -> String {
     let frame = document.frame.trim_start_matches('/');
     let stem = match blob.form {
@@ -66,12 +66,12 @@ pub(crate) fn topic(document: &Document, blob: &BlobInfo) -> String {
     if frame.is_empty() { format!("/{stem}{own}") } else { format!("/{stem}/{frame}{own}") }
 }
 
-/// The topic of a document.
+/// Topic of documents of a kind in an MCAP file.
 pub(crate) fn document_topic(kind: &str) -> String {
     format!("/document/{kind}")
 }
 
-/// The part of a blob's message before its bytes.
+/// Encodes the part of a blob's message that precedes the bytes of the blob.
 pub(crate) fn prefix(document: &Document, blob: &BlobInfo) -> Vec<u8> {
     let mut out = Wire::default();
     let number = |key: &str| blob.layout.get(key).and_then(Value::as_u64).unwrap_or(0) as u32;
@@ -139,17 +139,17 @@ fn numeric_type(name: &str) -> u64 {
 /// Severity of a line of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogLevel {
-    /// For developers.
+    /// Details for developers.
     Debug = 1,
-    /// Information.
+    /// Normal event.
     Info = 2,
-    /// Warning.
+    /// Unexpected event.
     Warning = 3,
-    /// Error.
+    /// Failure.
     Error = 4,
 }
 
-/// One line of the log (`foxglove.Log`).
+/// Encodes a line of the log (`foxglove.Log`).
 pub(crate) fn log(stamp_ns: i64, level: LogLevel, name: &str, message: &str) -> Vec<u8> {
     let mut out = Wire::default();
     out.timestamp(1, stamp_ns);
@@ -159,7 +159,7 @@ pub(crate) fn log(stamp_ns: i64, level: LogLevel, name: &str, message: &str) -> 
     out.0
 }
 
-/// Transforms of one link (`foxglove.FrameTransforms`).
+/// Encodes transforms between one pair of frames (`foxglove.FrameTransforms`).
 pub(crate) fn frame_transforms(parent: &str, child: &str, samples: &[Sample]) -> Vec<u8> {
     let mut out = Wire(Vec::with_capacity(samples.len() * (100 + parent.len() + child.len())));
     for sample in samples {

@@ -7,16 +7,16 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::packed;
 
-/// Static structure of a place, from all visits.
+/// Static structure of a place, learned from all visits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Visited {
-    /// The waypoint of the observations.
+    /// Name of the waypoint where the place was observed.
     pub waypoint: String,
     /// Pose of the place in the map: x and y, metres, and the heading, radians.
     pub at: [f64; 3],
     /// Time of the last visit, seconds since 1970.
     pub last_unix_s: f64,
-    /// Static structure.
+    /// Static structure of the place.
     #[serde(serialize_with = "write_room", deserialize_with = "read_room")]
     pub room: MetaRoom,
 }
@@ -24,22 +24,23 @@ pub struct Visited {
 /// A learned object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LearnedThing {
-    /// Name.
+    /// Name of the object.
     pub name: String,
     /// Time of learning, seconds since 1970.
     pub learned_unix_s: f64,
-    /// Surface points relative to the object's centre, upright as it stood, metres.
+    /// Surface points relative to the object's centre, upright as the object stood, metres.
     #[serde(with = "packed")]
     pub cloud: Cloud,
     /// Share of the directions around the object from which it was seen, 0 to 1.
     pub sides: f64,
-    /// Directions as a bit set: 36 sectors, counted anticlockwise from the object's x axis.
+    /// Directions from which the object was seen, as a set of 36 bits: sectors counted anticlockwise from the
+    /// object's x axis.
     #[serde(default)]
     pub directions: u64,
-    /// Number of encounters with views from all around that the cloud merges.
+    /// Number of encounters, each with views from all around, that the cloud merges.
     #[serde(default = "once")]
     pub meetings: u32,
-    /// Place of the last sighting.
+    /// Place and time of the last sighting.
     pub seen: Place,
 }
 
@@ -52,7 +53,7 @@ fn once() -> u32 {
 pub struct Place {
     /// Time of the sighting, seconds since 1970.
     pub unix_s: f64,
-    /// Centre, map frame, metres.
+    /// Centre of the object, map frame, metres.
     pub at_m: Point3<f64>,
     /// Symbol of the supporting surface.
     pub on: String,

@@ -8,24 +8,25 @@ use nalgebra::{Point3, Vector3};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Candidate units: a tenth of a millimetre for small clouds, a millimetre for large ones, metres.
+/// Candidate units, metres: a tenth of a millimetre for small clouds, a millimetre for large ones.
 const UNITS_M: [f64; 2] = [1e-4, 1e-3];
-/// Marks an unknown component of a normal.
+/// Mark of an unknown component of a normal.
 const UNKNOWN: i8 = i8::MIN;
 
-/// Packed form of a cloud.
+/// Text encoding of a cloud.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Packed {
+    /// Unit of the coordinates, metres.
     pub unit_m: f64,
-    /// The minimum corner, in units.
+    /// Minimum corner of the cloud, in units.
     low: [i64; 3],
-    /// Three `u16` a point, little-endian.
+    /// Coordinates of each point, in units from `low`: three little-endian `u16`, as base64.
     pub points: String,
-    /// Three `i8` a point, in units of 1/127.
+    /// Normal of each point: three `i8` in units of 1/127, as base64.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     normals: Option<String>,
-    /// Red, green, blue.
+    /// Red, green and blue of each point: three bytes, as base64.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colours: Option<String>,
 }

@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Kinds of documents with a special form; any other word is a kind as well.
+/// Kinds of documents that have a special form; any other word is a kind as well.
 pub mod kind {
     /// A point cloud.
     pub const CLOUD: &str = "cloud";
@@ -39,11 +39,11 @@ pub struct Options {
     pub durability: Durability,
     /// Limits beyond which old data is pruned.
     pub retention: Retention,
-    /// Length of a segment, bytes.
+    /// Length, bytes, at which a segment (a file of the record) is followed by another.
     pub segment_bytes: u64,
-    /// Name of the recording robot, where several write into one store.
+    /// Name of the recording robot, if several write into one store; else "".
     pub robot: String,
-    /// Time span of a group of transforms, nanoseconds (paper 004's recorder: 2 s).
+    /// Time span of the transforms that are written together, nanoseconds (paper 004's recorder: 2 s).
     pub group_ns: i64,
     /// Limits of interpolating and extrapolating transforms.
     pub reach: Reach,
@@ -103,8 +103,9 @@ pub enum Image<'a> {
 /// A record: all sensor data, actions and beliefs, ordered by time.
 ///
 /// The results of `put_cloud`, `put_image`, `put_document` and `put_log` are acknowledged: they are on the
-/// disk as far as [`Options::durability`] promises. Transforms arrive thousands a second and are grouped;
-/// they are acknowledged by the next [`Record::sync`], or once their group is written in the background.
+/// disk as far as [`Options::durability`] promises. Transforms arrive thousands a second and are written in
+/// groups; they are acknowledged by the next [`Record::sync`], or once their group is written in the
+/// background.
 pub struct Record {
     store: Arc<dyn Store>,
     recovery: Recovery,
@@ -118,11 +119,11 @@ pub struct Record {
     is_at_bound: AtomicBool,
 }
 
-/// Transforms not yet in a document, by child and parent.
+/// Transforms that are not yet in a document, by child and parent frame.
 #[derive(Default)]
 struct Groups {
     open: BTreeMap<(String, String), Vec<Sample>>,
-    /// Span of [`Options::group_ns`] to which the open groups belong.
+    /// Index of the time span of [`Options::group_ns`] to which the open groups belong.
     span: i64,
 }
 
@@ -135,7 +136,7 @@ impl Record {
         Ok(Self::local(LocalStore::create(dir, &options.robot, options.local())?, options))
     }
 
-    /// Opens a record for writing; repairs the traces of a crash.
+    /// Opens a record for writing, and repairs the traces of a crash.
     ///
     /// # Errors
     /// [`Error::NoRecord`], [`Error::InUse`], or what the system refuses.
@@ -143,9 +144,9 @@ impl Record {
         Ok(Self::local(LocalStore::open(dir, &options.robot, options.local())?, options))
     }
 
-    /// Opens an interrupted record whose writer replays it from the start: each document, cloud, image or
-    /// transform that equals the next recorded one of its kind is identified with that one, and not written
-    /// again.
+    /// Opens an interrupted record for a writer that repeats its run from the start: each document, cloud,
+    /// image or transform that equals the next recorded one of its kind is taken for that one, and not
+    /// written again.
     ///
     /// # Errors
     /// As [`Record::open`].
@@ -153,7 +154,8 @@ impl Record {
         Self::open(dir, options)?.retracing()
     }
 
-    /// Starts retracing on a record of any store; see [`Record::resume`].
+    /// Expects on a record of any store that its writer repeats the run from the start, as in
+    /// [`Record::resume`].
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -177,7 +179,7 @@ impl Record {
         record
     }
 
-    /// A record on a given store.
+    /// Creates a record on a given store.
     pub fn on(store: Arc<dyn Store>, options: Options) -> Self {
         Record {
             flusher: Flusher::start(store.clone()),
@@ -253,7 +255,7 @@ impl Record {
         appended
     }
 
-    /// True once data did not fit within the size limit; nothing more can be recorded.
+    /// True once data did not fit within the size limit, so that nothing more can be recorded.
     pub fn is_at_bound(&self) -> bool {
         self.is_at_bound.load(Ordering::Relaxed)
     }
@@ -297,7 +299,7 @@ impl Record {
         Ok((whole, faults))
     }
 
-    /// The newest document of a kind.
+    /// Newest document of a kind by this robot, if there is one.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -306,7 +308,7 @@ impl Record {
         Ok(self.store.find(&query)?.pop())
     }
 
-    /// The document of a kind nearest in time, within a tolerance.
+    /// Document of a kind by this robot that is nearest in time, within a tolerance in nanoseconds.
     ///
     /// # Errors
     /// [`Error::NotNear`] with the nearest there is.
@@ -314,7 +316,7 @@ impl Record {
         self.nearest_of(&self.own(kind), stamp_ns, tolerance_ns)
     }
 
-    /// The document nearest in time among those that match a query, within a tolerance.
+    /// Document nearest in time among those that match a query, within a tolerance in nanoseconds.
     ///
     /// # Errors
     /// [`Error::NotNear`] with the nearest there is.
@@ -328,8 +330,8 @@ impl Record {
         })
     }
 
-    /// Pins records on behalf of `by` (a belief, a model, a plan), so that they are never pruned; clouds
-    /// together with the transforms of their time.
+    /// Pins records on behalf of `by` (a belief, a model, a plan), so that they are never pruned; with a
+    /// cloud or sweep also the transforms and images of its time.
     ///
     /// # Errors
     /// [`Error::Missing`] if a record does not exist; then none is pinned.
@@ -365,7 +367,7 @@ impl Record {
         crate::export::export(&*self.store, query, path)
     }
 
-    /// Reads every record and reports damage.
+    /// Reads every record and reports the damage.
     ///
     /// # Errors
     /// If the store itself cannot be read.
@@ -373,7 +375,7 @@ impl Record {
         self.store.verify()
     }
 
-    /// Counts and sizes.
+    /// Counts and sizes of the store.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -399,7 +401,7 @@ impl Drop for Record {
 }
 
 impl Record {
-    /// Query for all documents of a kind by this robot; by any robot, if robots have no names.
+    /// Query for all documents of a kind by this robot, or by any robot if this one has no name.
     pub fn own(&self, kind: &str) -> Query {
         Query { robot: named(&self.options.robot), ..Query::of_kind(kind) }
     }

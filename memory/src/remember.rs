@@ -1,5 +1,5 @@
-//! Persistent belief across runs: the last sighting of each object and its time. A later run starts from it,
-//! discounted by age.
+//! Belief that is kept between runs: the last sighting of each object and its time. A later run starts from
+//! it, discounted by age.
 
 #[doc(hidden)]
 pub mod joined;
@@ -20,11 +20,11 @@ use crate::error::Error;
 use crate::learned::{LearnedThing, Visited};
 use crate::record::Record;
 
-/// Kind of the document that holds the memory.
+/// Kind of the document that holds what is kept between runs.
 const KIND: &str = "remembered";
 /// Half-life of the probability that an object is still at its last known place, seconds: a day.
 pub const HALF_LIFE_S: f64 = 86_400.0;
-/// Maximum number of vanished objects in memory; the oldest are forgotten first.
+/// Maximum number of vanished objects that are kept; the oldest are forgotten first.
 pub const MOST_GONE: usize = 500;
 
 /// Last sighting of an object.
@@ -39,36 +39,36 @@ pub struct Recollection {
 /// Map that a body has built itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Surveyed {
-    /// Voxel survey, extended by later runs.
+    /// Voxel map, extended by later runs.
     pub survey: Survey,
-    /// Corrected viewpoints, from registering the views.
+    /// Poses of the body at the views, corrected by registering the views.
     pub stood: Vec<Isometry2<f64>>,
-    /// Poses as stated by the body, in its own map.
+    /// Poses of the body at the same views as estimated by the body, in its own map.
     pub believed: Vec<Isometry2<f64>>,
     /// Horizontal support surfaces with their given names.
     pub surfaces: Vec<(String, Level)>,
-    /// Straight segments that the body has driven, in its own map, metres.
+    /// Straight segments along which the body has driven, in its own map, metres.
     #[serde(default)]
     pub driven: Vec<[Point2<f64>; 2]>,
-    /// Places where the body does not fit although the map shows free space, in its own map.
+    /// Places, in the body's own map, metres, where the body does not fit although the map shows free space.
     #[serde(default)]
     pub barred: Vec<Point2<f64>>,
 }
 
-/// Memory of all earlier runs.
+/// Everything that earlier runs keep for later ones.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Remembered {
-    /// Objects as of the last look at their surface.
+    /// Objects that were present when their surface was last viewed.
     pub present: Vec<Recollection>,
-    /// Objects that had vanished at a later look at their place, oldest first.
+    /// Objects that had vanished when their place was viewed again, oldest first.
     pub gone: Vec<Recollection>,
-    /// Symbols of surfaces that were looked at; incomplete for older stores.
+    /// Symbols of the surfaces that were viewed; incomplete for older stores.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub looked_at: Vec<String>,
     /// Learned shapes, oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<KnownShape>,
-    /// The map that the body built, if any.
+    /// Map that the body built, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surveyed: Option<Surveyed>,
     /// Static structure of visited places.
@@ -77,18 +77,18 @@ pub struct Remembered {
     /// Learned objects, oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub things: Vec<LearnedThing>,
-    /// Memory of further abilities, by their names.
+    /// Data that other abilities keep between runs, by ability name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub besides: BTreeMap<String, Value>,
 }
 
 impl Remembered {
-    /// Memory of an ability; none if it kept nothing, or kept it in another form.
+    /// Data that an ability keeps between runs; `None` if it kept none, or kept it in another form.
     pub fn besides<T: DeserializeOwned>(&self, ability: &str) -> Option<T> {
         serde_json::from_value(self.besides.get(ability)?.clone()).ok()
     }
 
-    /// Reads the memory from a store; empty for a new store.
+    /// Reads what earlier runs kept in a store; empty for a new store.
     ///
     /// # Errors
     /// [`Error`] if it cannot be read.
@@ -100,7 +100,7 @@ impl Remembered {
         })
     }
 
-    /// Writes the memory to a store.
+    /// Writes what is kept between runs to a store; `now_unix_s` is the current time, seconds since 1970.
     ///
     /// # Errors
     /// [`Error`] if it cannot be written.
@@ -114,8 +114,8 @@ impl Remembered {
         store.sync()
     }
 
-    /// Memory after a run: the run's belief about the surfaces it looked at, and the earlier memory
-    /// of all others.
+    /// Updates what is kept after a run: the run's belief about the surfaces that it viewed, and the earlier
+    /// content for all others.
     pub fn after(self, belief: &Belief, looked_at: &[String], now_unix_s: f64) -> Self {
         let is_here = |r: &Recollection| looked_at.contains(&r.track.on);
         let (before, elsewhere): (Vec<_>, Vec<_>) = self.present.into_iter().partition(is_here);
@@ -135,18 +135,18 @@ impl Remembered {
         Self { present, gone, looked_at: all, ..self }
     }
 
-    /// True if a surface was ever looked at, or an object was seen on it.
+    /// True if a surface was ever viewed, or an object was seen on it.
     pub fn has_looked_at(&self, surface: &str) -> bool {
         let mut seen = self.present.iter().chain(&self.gone);
         self.looked_at.iter().any(|s| s == surface) || seen.any(|r| r.track.on == surface)
     }
 
-    /// Renames a learned object in all sightings.
+    /// Renames a learned object, also in the probabilities of all tracks.
     pub fn rename(&mut self, old: &str, new: &str) {
         self.call(|name| (name == old).then(|| new.to_owned()));
     }
 
-    /// Renames objects for which `other` gives a name.
+    /// Renames all learned objects for which `other` gives a name.
     fn call(&mut self, other: impl Fn(&str) -> Option<String>) {
         let rename = |name: &mut String| {
             if let Some(new) = other(name) {
@@ -160,8 +160,8 @@ impl Remembered {
         }
     }
 
-    /// Tracks discounted by age: probabilities decay and stay below `most`, so nothing is certain without a
-    /// new look.
+    /// Tracks of the present objects, discounted by age: probabilities decay and stay at or below `most`, so
+    /// nothing is certain without a new view.
     pub fn aged(&self, now_unix_s: f64, most: f64) -> Vec<Track> {
         let aged = |r: &Recollection| {
             let worn = 0.5_f64.powf((now_unix_s - r.seen_unix_s).max(0.0) / HALF_LIFE_S);
@@ -183,8 +183,8 @@ impl Remembered {
         self.present.iter().map(aged).collect()
     }
 
-    /// Last sighting of a name, and true if the object was still there at the next look; `None` if
-    /// never seen.
+    /// Last sighting of a known object or a kind by name; true if the object was present at the last view of
+    /// its place, false if it had vanished. `None` if never seen.
     pub fn last_seen(&self, name: &str) -> Option<(&Recollection, bool)> {
         let is = |r: &&Recollection| r.track.probability_of(name) > 0.5;
         let newest = |list: &'_ [Recollection]| -> Option<usize> {
@@ -197,5 +197,5 @@ impl Remembered {
     }
 }
 
-/// Maximum distance between the old and new positions of one object, metres.
+/// Maximum distance between an old and a new position that count as the same object, metres.
 pub const SAME_M: f64 = 0.10;

@@ -1,4 +1,5 @@
-//! Continuing a record: data that its writer repeats is recognised and not written again.
+//! Repeating a recorded run from its start: data that the writer gives again is recognised and not written
+//! again.
 
 use crate::document::{Document, Draft, Query, RecordId};
 use crate::error::Error;
@@ -7,7 +8,7 @@ use crate::stores::{PIN, Store};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
-/// Progress of a retraced run, by kind of document.
+/// Progress of a run that repeats its record, by kind of document.
 pub(crate) struct Retrace {
     /// Name of the robot; "" where robots have no names.
     robot: String,
@@ -18,9 +19,10 @@ pub(crate) struct Retrace {
 
 #[derive(Clone, Copy)]
 enum Step {
-    /// The next recorded document is the one after this stamp and number.
+    /// The last recognised document has this stamp, in nanoseconds, and number (`None`: none yet); the next
+    /// one is compared.
     Behind(Option<(i64, RecordId)>),
-    /// All further documents are new.
+    /// All further documents of the kind are new.
     New,
 }
 
@@ -30,8 +32,8 @@ impl Retrace {
         Ok(Retrace { robot: robot.into(), newest_ns, steps: Mutex::default() })
     }
 
-    /// Record that equals a draft, if it is the next of its kind. After the first mismatch, all
-    /// drafts of that kind are new.
+    /// Number of the next recorded document of the draft's kind, if it equals the draft. After the first
+    /// mismatch, all drafts of that kind are new.
     pub fn next(&self, store: &dyn Store, draft: &Draft) -> Result<Option<RecordId>, Error> {
         let same = |found: &Document| Ok(draft.document(found.id, &found.robot)? == *found);
         self.next_like(store, &draft.kind, same)

@@ -47,10 +47,10 @@ pub fn encode(scan: &Scan) -> Result<Blob<'static>, Error> {
     Ok(Blob { name: SCAN.into(), form: Form::LaserScan, layout: json!(layout), data: data.into() })
 }
 
-/// Decodes a sweep taken at a pose.
+/// Decodes a laser sweep that was taken at the pose `map_from_laser`.
 ///
 /// # Errors
-/// A description of the mismatch in the layout.
+/// Reason for which the layout cannot be read, or does not match the data.
 pub fn decode(info: &BlobInfo, data: &[u8], map_from_laser: Isometry2<f64>) -> Result<Scan, String> {
     let layout: Layout =
         Layout::deserialize(&info.layout).map_err(|e| format!("its layout cannot be read: {e}"))?;

@@ -9,18 +9,20 @@ use descry_perception::noise::axial_sigma_m;
 use descry_perception::visibility::DepthMap;
 use rustc_hash::FxHashMap;
 
-/// Voxels along the side of a block.
+/// Number of voxels along the side of a block.
 const SIDE: i32 = 16;
 const BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
-/// Voxels along the side of a brick, of which a block has 64.
+/// Number of voxels along the side of a brick; a block has 64 bricks.
 const BRICK: i32 = 4;
-/// Distance below which two viewpoints are the same, metres.
+/// Distance below which two viewpoints count as the same, metres.
 const SAME_PLACE_M: f64 = 0.1;
-/// Marks an unobserved voxel.
+/// Mark of an unobserved voxel.
 const UNSEEN: i8 = i8::MIN;
-/// Log-odds update of a voxel: increment on a surface, decrement in front of one, and limit.
+/// Increment of a voxel's log-odds for a surface measured in it.
 const HIT: i8 = 3;
+/// Decrement of a voxel's log-odds for a camera that looks through it.
 const MISS: i8 = 1;
+/// Limit of a voxel's log-odds in either direction.
 const SURE: i8 = 12;
 
 /// State of a voxel.
@@ -45,7 +47,8 @@ pub struct Space {
     seen_from: Vec<Point3<f64>>,
 }
 
-/// Occlusion index for lines of sight: bricks with an occupied voxel, by block, over their bounding box.
+/// Set of bricks with an occupied voxel, one bit each, by block within a bounding box of blocks; tests of
+/// lines of sight use it.
 #[derive(Debug, Clone, Default)]
 struct Opaque {
     low: [i32; 3],
@@ -83,8 +86,8 @@ impl Opaque {
         (within(x, sx) && within(y, sy) && within(z, sz)).then(|| ((x * sy + y) * sz + z) as usize)
     }
 
-    /// First and last step of a line of sight within the box; none if the line misses the box. In
-    /// voxels.
+    /// First and last step of a line of sight within the bounding box; `None` if the line misses the box. All
+    /// lengths are in voxels.
     fn clip(&self, from: &Vector3<f64>, step: &Vector3<f64>, last: f64) -> Option<(i64, i64)> {
         let (mut enters, mut leaves) = (0.0_f64, last);
         for axis in 0..3 {
@@ -104,7 +107,7 @@ impl Opaque {
     }
 }
 
-/// Voxels of a block, and the set of its bricks with an occupied voxel; lines of sight skip all others.
+/// Voxels of a block, and the set of bricks with an occupied voxel; lines of sight skip the other bricks.
 #[derive(Debug, Clone)]
 struct Block {
     levels: [i8; BLOCK],
@@ -129,7 +132,7 @@ impl Block {
     }
 }
 
-/// Number of known voxels.
+/// Numbers of observed voxels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Extent {
     /// Free voxels.
@@ -146,7 +149,7 @@ impl Default for Space {
 }
 
 impl Space {
-    /// An unobserved map with this voxel size and maximum range of views, metres.
+    /// Creates an unobserved map with this voxel size and maximum range of views, metres.
     pub fn new(voxel_m: f64, range_m: f64) -> Self {
         Self {
             voxel_m,
@@ -157,7 +160,7 @@ impl Space {
         }
     }
 
-    /// The viewpoints integrated so far, merged where nearer than `SAME_PLACE_M`.
+    /// Viewpoints of the integrated views, world frame, metres; nearer than `SAME_PLACE_M` they count once.
     pub fn seen_from(&self) -> &[Point3<f64>] {
         &self.seen_from
     }
@@ -176,8 +179,8 @@ impl Space {
         }
     }
 
-    /// True if no occupied voxel lies between two points, except in places that are taken to be `gone`. The
-    /// last two voxels before `to` do not count, so that a surface does not hide itself.
+    /// True if no occupied voxel lies between two points, except where `gone` is true. The last two voxels
+    /// before `to` do not count, so that a surface does not hide itself.
     pub fn line_of_sight(
         &self,
         from: &Point3<f64>,
@@ -225,8 +228,8 @@ impl Space {
         (0..steps.max(0.0) as u32).filter(unseen).count() as f64 * self.voxel_m
     }
 
-    /// Resets an upright cylinder to unobserved, where the scene may have changed: the foot of its axis, the
-    /// unit vector up, its radius and its height in metres.
+    /// Resets an upright cylinder to unobserved, because the scene may have changed there: foot of the axis,
+    /// unit vector up, radius and height in metres.
     pub fn forget(&mut self, foot: &Point3<f64>, up: &Vector3<f64>, radius_m: f64, height_m: f64) {
         let voxel_m = self.voxel_m;
         for (key, block) in &mut self.blocks {
@@ -284,7 +287,7 @@ impl Space {
         extent
     }
 
-    /// Share of unobserved voxels in a box, 0 to 1.
+    /// Share of unobserved voxels in a box between two corners, 0 to 1.
     pub fn unseen_share(&self, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
         let (low, high) = (self.voxel(low), self.voxel(high));
         let (mut all, mut unseen) = (0_usize, 0_usize);
@@ -308,7 +311,7 @@ impl Space {
         self.blocks.get(&key).map_or(UNSEEN, |block| block.levels[index(voxel)])
     }
 
-    /// The blocks that meet the camera's field of view, in a fixed order.
+    /// Blocks that meet the camera's field of view, in a fixed order.
     fn blocks_in_view(
         &self,
         map: &DepthMap,
@@ -345,9 +348,8 @@ impl Space {
         keys
     }
 
-    /// The voxels with a measured surface, by block, where the depth is more certain than a voxel. They must
-    /// not become free: at a grazing angle, the depth measured at a voxel's centre may be far behind the
-    /// voxel.
+    /// Voxels with a measured surface, by block, where the depth is more accurate than a voxel. They must not
+    /// become free: at a grazing angle, the depth measured at a voxel's centre may be far behind the voxel.
     fn measured(
         &self,
         map: &DepthMap,
@@ -372,8 +374,8 @@ impl Space {
         blocks
     }
 
-    /// Updates the voxels of a block from a depth image, given the voxels with a measured surface. True if
-    /// any voxel was observed.
+    /// Updates the voxels of a block from a depth image; `measured` marks the voxels with a measured surface.
+    /// Returns true if any voxel was observed.
     fn look_at_block(
         &self,
         map: &DepthMap,
@@ -428,7 +430,8 @@ fn floor(value: f64) -> i32 {
     toward_zero - i32::from(f64::from(toward_zero) > value)
 }
 
-/// Number of steps along a line of sight that leave the cube around a voxel; the samples within are skipped.
+/// Number of steps along a line of sight that leave the cube of `side` voxels around a voxel; the samples
+/// within are skipped.
 fn steps_out_of(
     side: i32,
     voxel: [i32; 3],

@@ -10,10 +10,11 @@ use crate::error::Error;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Kinds of the documents that record pins.
+/// Kind of a document that adds pins, which protect records from pruning.
 pub(crate) const PIN: &str = "pin";
+/// Kind of a document that removes pins.
 pub(crate) const UNPIN: &str = "unpin";
-/// Holder of the pins on records that are never pruned.
+/// Name of the holder of pins on records that are never pruned.
 pub(crate) const KEPT: &str = "record";
 
 /// Limits of a store; data beyond them is pruned oldest first, pinned records excepted. The default
@@ -31,26 +32,26 @@ pub struct Retention {
 /// Counts and sizes of a store.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stats {
-    /// Records.
+    /// Number of records.
     pub records: u64,
     /// Size on the disk, bytes, the index included.
     pub bytes: u64,
-    /// Records and the bytes of their messages, by kind.
+    /// Number of records and the bytes of their messages, by kind.
     pub kinds: BTreeMap<String, Count>,
     /// Number of pinned records.
     pub pinned: u64,
-    /// Oldest stamp, nanoseconds.
+    /// Oldest stamp, nanoseconds; `None` without records.
     pub oldest_ns: Option<i64>,
-    /// Newest stamp, nanoseconds.
+    /// Newest stamp, nanoseconds; `None` without records.
     pub newest_ns: Option<i64>,
-    /// Segments on the disk (0 for stores without).
+    /// Number of segments on the disk; 0 for stores without segments.
     pub segments: u64,
 }
 
-/// Count of records, and the bytes of their messages.
+/// Number of records, and the bytes of their messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Count {
-    /// Records.
+    /// Number of records.
     pub records: u64,
     /// Bytes of documents and blobs.
     pub bytes: u64,
@@ -63,7 +64,7 @@ pub struct Report {
     pub whole: u64,
     /// Bytes of documents and blobs read.
     pub bytes: u64,
-    /// Faults, one line each.
+    /// Damage that was found.
     pub faults: Vec<Fault>,
 }
 
@@ -72,9 +73,9 @@ pub struct Report {
 pub struct Fault {
     /// The damaged record, if known.
     pub record: Option<RecordId>,
-    /// File or collection.
+    /// File or collection that is damaged.
     pub place: String,
-    /// Description.
+    /// Description of the damage.
     pub what: String,
 }
 
@@ -125,13 +126,14 @@ impl Pages {
         Pages { query: query.clone(), left: query.limit.unwrap_or(usize::MAX) }
     }
 
-    /// The query for the next page, if there is one.
+    /// Query for the next page; `None` after the last.
     pub fn next(&self) -> Option<Query> {
         let limit = Some(self.left.min(Self::AT_ONCE));
         (self.left > 0).then(|| Query { limit, ..self.query.clone() })
     }
 
-    /// Counts the results of a page, and stores the stamp and number of the last.
+    /// Notes a page: its number of results, and the stamp and number of the last one, `None` for an empty
+    /// page.
     pub fn was(&mut self, found: usize, last: Option<(i64, RecordId)>) {
         self.query.after = last;
         self.left = if last.is_some() { self.left - found } else { 0 };
@@ -148,13 +150,13 @@ pub trait Store: Send + Sync {
     /// [`Error::Full`] without room, [`Error::Input`] for what cannot be recorded.
     fn append(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error>;
 
-    /// The document of a record.
+    /// Reads the document of a record.
     ///
     /// # Errors
     /// [`Error::Missing`], [`Error::Damaged`].
     fn get(&self, id: RecordId) -> Result<Document, Error>;
 
-    /// The bytes of a blob.
+    /// Reads the bytes of a blob.
     ///
     /// # Errors
     /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
@@ -189,14 +191,14 @@ pub trait Store: Send + Sync {
         Ok(faults)
     }
 
-    /// The document nearest in stamp among those that match a query (order and limit aside); the earlier of
-    /// two at the same distance, the newest of one stamp.
+    /// Finds the document nearest in time among those that match a query (its order and limit aside): of two
+    /// at the same distance the earlier, of several with one stamp the newest. `None` if none matches.
     ///
     /// # Errors
     /// If the store cannot be read.
     fn nearest(&self, query: &Query, stamp_ns: i64) -> Result<Option<Document>, Error>;
 
-    /// The frames of the records of a kind, sorted.
+    /// Names of the coordinate frames of all records of a kind, sorted.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -208,11 +210,11 @@ pub trait Store: Send + Sync {
     /// [`Error::Missing`] if one does not exist; then none is pinned.
     fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
-    /// Replaces the pins of `by` by these records; at no moment is less pinned than before or after. Durable
-    /// on return.
+    /// Replaces the pins of `by` by pins on these records. At no moment is a record unpinned that is pinned
+    /// both before and after. Durable on return.
     ///
     /// # Errors
-    /// [`Error::Missing`] if one does not exist; then nothing changes.
+    /// [`Error::Missing`] if a record does not exist; then nothing changes.
     fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
     /// Removes all pins of `by`.
@@ -221,7 +223,7 @@ pub trait Store: Send + Sync {
     /// If the store cannot be written.
     fn unpin(&self, by: &str) -> Result<(), Error>;
 
-    /// Pinned records, with the holders of the pins.
+    /// Numbers of the pinned records, with the names of the holders of the pins.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -239,7 +241,7 @@ pub trait Store: Send + Sync {
     /// If the store cannot be written.
     fn prune(&self, retention: &Retention) -> Result<u64, Error>;
 
-    /// Counts and sizes.
+    /// Counts and sizes of the store.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -252,7 +254,7 @@ pub trait Store: Send + Sync {
     fn verify(&self) -> Result<Report, Error>;
 }
 
-/// The error for a blob that a record does not have.
+/// Error for a blob that a record does not have.
 pub(crate) fn no_blob(document: &Document, name: &str) -> Error {
     let has: Vec<_> = document.blobs.iter().map(|b| format!("`{}`", b.name)).collect();
     Error::NoBlob {

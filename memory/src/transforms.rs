@@ -11,9 +11,9 @@ pub enum TransformError {
     /// No transform mentions that frame.
     #[error("no transform names the frame `{frame}`; known are: {known}")]
     UnknownFrame {
-        /// The frame asked for.
+        /// Name of the requested frame.
         frame: String,
-        /// The known frames.
+        /// Names of the known frames.
         known: String,
     },
     /// Two frames are in different trees at that time.
@@ -25,25 +25,25 @@ pub enum TransformError {
         target: String,
         /// Frame to transform from.
         origin: String,
-        /// Root of the first chain.
+        /// Root of the tree that holds `target`.
         target_root: String,
-        /// Root of the second chain.
+        /// Root of the tree that holds `origin`.
         origin_root: String,
-        /// The time, nanoseconds.
+        /// Requested time, nanoseconds.
         stamp_ns: i64,
     },
-    /// A link has no measurement near that time.
+    /// Two linked frames have no measured transform near that time.
     #[error("the link `{parent}` <- `{child}` was not measured near {stamp_ns} ns: {}", gap_text(*stamp_ns, *before_ns, *after_ns, *max_gap_ns))]
     Gap {
         /// Parent frame.
         parent: String,
         /// Child frame.
         child: String,
-        /// The time, nanoseconds.
+        /// Requested time, nanoseconds.
         stamp_ns: i64,
-        /// Last measurement before, nanoseconds.
+        /// Time of the last measurement before, nanoseconds; `None` if there is none.
         before_ns: Option<i64>,
-        /// First measurement after, nanoseconds.
+        /// Time of the first measurement after, nanoseconds; `None` if there is none.
         after_ns: Option<i64>,
         /// Maximum gap that is interpolated, nanoseconds.
         max_gap_ns: i64,
@@ -53,9 +53,9 @@ pub enum TransformError {
         "at {stamp_ns} ns the frames {frames} are each other's parents: one of these links is the wrong way round"
     )]
     Loop {
-        /// The frames of the cycle.
+        /// Names of the frames in the cycle.
         frames: String,
-        /// The time, nanoseconds.
+        /// Requested time, nanoseconds.
         stamp_ns: i64,
     },
     /// An invalid transform.
@@ -98,7 +98,7 @@ pub struct Reach {
     /// Maximum gap between two measurements for interpolation, nanoseconds. Paper 004's recorder restores 4 s
     /// around a stamp.
     pub max_gap_ns: i64,
-    /// Time for which the first or last measurement holds beyond its stamp, nanoseconds.
+    /// Time by which the first or last measurement holds beyond its stamp, nanoseconds.
     pub hold_ns: i64,
 }
 
@@ -108,12 +108,12 @@ impl Default for Reach {
     }
 }
 
-/// Pose of a child in its parent at a time.
+/// Pose of a child frame in its parent at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// The time, nanoseconds.
     pub stamp_ns: i64,
-    /// The transform.
+    /// Transform from the child frame to the parent frame.
     pub parent_from_child: Isometry3<f64>,
 }
 
@@ -123,7 +123,7 @@ struct Link {
     samples: BTreeMap<i64, Isometry3<f64>>,
 }
 
-/// State of a link at a time.
+/// State of the link between two frames at a time: the transform, or the measurements around a gap.
 enum At {
     Known(Isometry3<f64>),
     Gap { before_ns: Option<i64>, after_ns: Option<i64> },
@@ -147,8 +147,8 @@ impl Link {
         }
     }
 
-    /// Precedence among the links of a child: the link in force at a time is the last begun, or else the next
-    /// to begin.
+    /// Rank of this link among the links of one child to several parents at a time, greatest first: the one
+    /// measured last before that time, else a static one, else the one measured next.
     fn precedence(&self, stamp_ns: i64) -> (u8, i64) {
         let before = self.samples.range(..=stamp_ns).next_back().map(|(&b, _)| b);
         let after = self.samples.range(stamp_ns..).next().map(|(&a, _)| a);
@@ -174,10 +174,10 @@ pub fn interpolate(from: &Isometry3<f64>, to: &Isometry3<f64>, t: f64) -> Isomet
     Isometry3::from_parts(Translation3::from(position), rotation)
 }
 
-/// Transforms in memory.
+/// Transform tree over time, in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Transforms {
-    /// Links by child, then parent: a child may change its parent over time.
+    /// Measured transforms by child frame, then parent frame: a child may change its parent over time.
     links: BTreeMap<String, BTreeMap<String, Link>>,
 }
 
@@ -226,7 +226,7 @@ impl Transforms {
         self.links.is_empty()
     }
 
-    /// All frames, sorted.
+    /// Names of all frames, sorted.
     pub fn frames(&self) -> Vec<&str> {
         let mut all: Vec<&str> = self
             .links
@@ -238,10 +238,11 @@ impl Transforms {
         all
     }
 
-    /// `target_from_origin` at a time, through the tree of that time.
+    /// Transform from `origin` to `target` at a time, through the tree of that time.
     ///
     /// # Errors
-    /// An unknown frame, a missing link (named by the two frames that it would join), a gap in time, or a loop.
+    /// An unknown frame, a missing link (named by the two frames that it would join), a gap in time, or a
+    /// loop.
     pub fn lookup(
         &self,
         target: &str,
@@ -272,7 +273,7 @@ impl Transforms {
         })
     }
 
-    /// `next_from_here` for two neighbours in the tree.
+    /// Transform from `here` to `next`, two neighbours in the tree.
     fn step(
         &self,
         here: &str,

@@ -12,11 +12,11 @@ use serde_json::Value;
 /// A box with a label.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labelled {
-    /// Stable ID of the object across sets of boxes.
+    /// Identifier of the object, the same in every set of boxes.
     pub id: String,
     /// Label above the box.
     pub text: String,
-    /// Pose of the box centre in the common frame.
+    /// Pose of the box's centre in the common frame of the boxes.
     pub frame_from_box: Isometry3<f64>,
     /// Sides, metres.
     pub size_m: Vector3<f64>,
@@ -39,22 +39,22 @@ fn colour(out: &mut Wire, number: u32, of: &[f64; 4]) {
     out.message(number, |c| (1..).zip(of).for_each(|(n, x)| c.double(n, *x)));
 }
 
-/// A line of the log.
+/// Encodes a line of the log from the source `name`.
 pub fn log(stamp_ns: i64, level: LogLevel, name: &str, message: &str) -> Blob<'static> {
     blob("log", Form::Log, line(stamp_ns, level, name, message))
 }
 
-/// Steps of a plan as a log line, in a log of its own.
+/// Encodes the steps of a plan as a line of a log of its own.
 pub fn plan(stamp_ns: i64, steps: &str) -> Blob<'static> {
     blob("plan", Form::Log, line(stamp_ns, LogLevel::Info, "plan", steps))
 }
 
-/// A derived cloud, such as `merged`, in the frame of its document.
+/// Encodes a derived cloud, such as `merged`, in the frame of its document.
 pub fn cloud<'a>(name: &str, cloud: &'a Cloud) -> Blob<'a> {
     Blob { name: name.into(), ..clouds::encode(cloud, &Sensing::default()) }
 }
 
-/// The set of boxes in a frame, which replaces the previous set in viewers.
+/// Encodes a set of boxes in a frame, which replaces the previous set in viewers.
 pub fn boxes(stamp_ns: i64, frame: &str, name: &str, boxes: &[Labelled]) -> Blob<'static> {
     const ALL: u64 = 1;
     let mut out = Wire::default();
@@ -87,7 +87,7 @@ pub fn boxes(stamp_ns: i64, frame: &str, name: &str, boxes: &[Labelled]) -> Blob
     blob(name, Form::SceneUpdate, out.0)
 }
 
-/// Projection of a camera without distortion.
+/// Encodes the projection of a camera without distortion.
 pub fn calibration(stamp_ns: i64, frame: &str, camera: &Intrinsics) -> Blob<'static> {
     let Intrinsics { width, height, fx, fy, cx, cy } = *camera;
     let mut out = Wire::default();
@@ -101,8 +101,8 @@ pub fn calibration(stamp_ns: i64, frame: &str, camera: &Intrinsics) -> Blob<'sta
     blob("calibration", Form::CameraCalibration, out.0)
 }
 
-/// Cells of a map, row by row (x fastest), one byte each; `origin_m` is the outer corner of the first cell,
-/// in the frame.
+/// Encodes the cells of a map, row by row (x fastest), one byte each; `origin_m` is the outer corner of the
+/// first cell in the frame, metres.
 pub fn grid(
     stamp_ns: i64,
     frame: &str,

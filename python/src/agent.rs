@@ -78,7 +78,7 @@ impl Report {
     }
 }
 
-/// Loads a domain, checks it as a whole, and puts functions in the places of its programs.
+/// Loads a domain, replaces its programs by the given Python functions, and checks that the domain can run.
 fn domain(py: Python<'_>, name: &str, given: [Given; 3], raised: &Arc<Raised>) -> PyResult<Domain> {
     let mut domain = Domain::load(name).map_err(|error| match error {
         LoadError::Findings { findings } => failure::findings(py, &findings),
@@ -89,7 +89,7 @@ fn domain(py: Python<'_>, name: &str, given: [Given; 3], raised: &Arc<Raised>) -
     Ok(domain)
 }
 
-/// Inputs of a run, except its body.
+/// Inputs of a run except its body: the goal in words, the domain, the folder of the record, and settings.
 struct Asked {
     said: String,
     domain: Domain,
@@ -119,7 +119,7 @@ impl Asked {
     }
 }
 
-/// Pursues a goal in the words of a domain.
+/// Pursues a goal, given in words that the domain defines, and returns the report of the run.
 #[pyfunction]
 #[pyo3(signature = (goal, *, domain, robot, scene, seed, policy, run, remember, attachments, facts, actions, on_event))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -206,7 +206,7 @@ pub fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
     runtime.map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))
 }
 
-/// The goal phrases of a domain.
+/// Goal phrases that a domain defines.
 #[pyfunction]
 #[pyo3(signature = (domain="tabletop"))]
 pub fn goals(py: Python<'_>, domain: &str) -> PyResult<Vec<String>> {

@@ -9,8 +9,8 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::watch::Watch;
 
-/// Function that answers the calls of a module, with the facts that its answer depends on and a cheap
-/// estimate for heuristics.
+/// Function that answers the calls of a semantic attachment, with the symbols of the facts that its answer
+/// depends on, and a cheap estimate for heuristics.
 #[pyclass(frozen, module = "descry")]
 pub struct Attachment {
     function: Py<PyAny>,
@@ -37,7 +37,7 @@ impl Attachment {
     }
 }
 
-/// A call to an attachment.
+/// A call to a semantic attachment: its module, kind and arguments.
 #[pyclass(frozen, module = "descry")]
 pub struct Call {
     inner: descry_planner::Call,
@@ -106,7 +106,7 @@ fn written<'py>(py: Python<'py>, value: &FactValue) -> PyResult<Bound<'py, PyAny
     })
 }
 
-/// Adapter of the attachment to the planner's trait.
+/// Adapter of a Python function to the planner's trait for semantic attachments.
 struct Asked {
     function: Py<PyAny>,
     reads: Vec<String>,
@@ -182,7 +182,8 @@ fn value(value: &Bound<'_, PyAny>) -> PyResult<FactValue> {
     Ok(FactValue::Object(value.extract::<String>()?.into()))
 }
 
-/// Binds functions to the modules of their names, for calls while `watch` is running.
+/// Binds Python functions to the semantic attachments of their names; `watch` gives the time and receives
+/// exceptions.
 pub fn bind(py: Python<'_>, given: Option<BTreeMap<String, Py<PyAny>>>, watch: &Arc<Watch>) -> Attachments {
     let clock = Arc::clone(watch);
     let mut attachments = Attachments::new().with_clock(move || clock.elapsed_s());

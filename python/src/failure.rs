@@ -53,7 +53,7 @@ impl Finding {
     }
 }
 
-/// `InputError` with its findings.
+/// Creates an `InputError` with its findings.
 pub fn findings(py: Python<'_>, findings: &Findings) -> PyErr {
     let all = Finding::all(findings);
     let fault = all.iter().find(|f| f.severity == "error").or(all.first()).cloned();
@@ -72,7 +72,7 @@ pub fn findings(py: Python<'_>, findings: &Findings) -> PyErr {
     told().map_or_else(|e| e, |told| raised(py, "InputError", &findings.render(false), Some(&told)))
 }
 
-/// `InputError` from a text whose further lines give the expectation and the fix.
+/// Creates an `InputError` from a text whose lines after the first give the expectation and the fix.
 pub fn input(py: Python<'_>, text: &str) -> PyErr {
     let told = PyDict::new(py);
     let set = || -> PyResult<()> {
@@ -87,17 +87,17 @@ pub fn input(py: Python<'_>, text: &str) -> PyErr {
     set().map_or_else(|e| e, |()| raised(py, "InputError", text, Some(&told)))
 }
 
-/// `BrokenError`: a body or a store that failed permanently.
+/// Creates a `BrokenError`: a body or a store failed permanently.
 pub fn broken(py: Python<'_>, text: &str) -> PyErr {
     raised(py, "BrokenError", text, None)
 }
 
-/// `InternalError`: a bug of this package.
+/// Creates an `InternalError`: a bug of this package.
 pub fn bug(py: Python<'_>, text: &str) -> PyErr {
     raised(py, "InternalError", text, None)
 }
 
-/// The exception for a planning error.
+/// Creates the exception for a planning error.
 pub fn planning(py: Python<'_>, error: &PlanError) -> PyErr {
     match error.findings() {
         Some(found) => findings(py, found),
@@ -105,7 +105,7 @@ pub fn planning(py: Python<'_>, error: &PlanError) -> PyErr {
     }
 }
 
-/// The exception for an error of a run.
+/// Creates the exception for an error of a run.
 pub fn command(py: Python<'_>, error: &CommandError) -> PyErr {
     match error {
         CommandError::BadInput(text) => input(py, text),

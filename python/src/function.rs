@@ -1,4 +1,4 @@
-//! Python functions in the places of a domain's programs.
+//! Python functions in place of a domain's programs.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 use crate::convert::{from_python, to_python};
 use crate::failure;
 
-/// Exceptions raised by functions.
+/// Exceptions raised by Python functions during a run.
 #[derive(Default)]
 pub struct Raised {
     /// The exception that ends the run, such as `KeyboardInterrupt`; ordinary failures of a function do not.
@@ -33,12 +33,13 @@ impl Raised {
         locked(&self.ends).is_some()
     }
 
-    /// The exception that ended the run, if any; a second call returns none.
+    /// Takes the exception that ended the run; `None` if there is none, or if it was taken before.
     pub fn ended(&self) -> Option<PyErr> {
         locked(&self.ends).take()
     }
 
-    /// The error of a run, with the failure of a function as its cause if its message quotes that failure.
+    /// Returns the error of a run, with the failure of a function as its cause if the message of the error
+    /// quotes that failure.
     pub fn behind(&self, py: Python<'_>, error: PyErr) -> PyErr {
         if let Some((words, failed)) = locked(&self.failed).take()
             && error.to_string().contains(&words)
@@ -63,7 +64,8 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Adapter that calls a Python function with the parts of a question.
+/// Adapter that calls a Python function in place of a program; `hear` takes the arguments from the question
+/// to the program.
 struct Called {
     function: Py<PyAny>,
     hear: fn(&Map<String, Value>) -> Vec<Value>,
@@ -90,20 +92,20 @@ impl Function for Called {
     }
 }
 
-/// The arguments of a call or an action.
+/// Arguments in the question about a call or an action.
 fn arguments(question: &Map<String, Value>) -> Vec<Value> {
     question.get("arguments").and_then(Value::as_array).cloned().unwrap_or_default()
 }
 
-/// The objects that a fact may mention, as one list argument.
+/// Objects that a fact may mention, in the question about that fact; passed as one list.
 fn objects(question: &Map<String, Value>) -> Vec<Value> {
     question.get("objects").cloned().into_iter().collect()
 }
 
-/// Functions by name.
+/// Python functions by name; `None` for no functions.
 pub type Given = Option<BTreeMap<String, Py<PyAny>>>;
 
-/// Replaces programs of a domain by functions.
+/// Replaces programs of a domain by the given Python functions for calls, facts and actions.
 ///
 /// # Errors
 /// `InputError` for a name without a program in `domain.toml`.

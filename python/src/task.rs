@@ -75,7 +75,7 @@ pub fn source(py: Python<'_>, path: &Path) -> PyResult<Source> {
     Ok(Source::new(path.display().to_string(), text))
 }
 
-/// All findings in a domain, and in a problem of it.
+/// Checks a PDDL domain, and a problem of that domain if one is given; returns all findings.
 #[pyfunction]
 #[pyo3(signature = (domain, problem=None))]
 pub fn check(domain: &str, problem: Option<&str>) -> Vec<Finding> {

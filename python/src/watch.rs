@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 /// Minimum interval between calls into Python, which take the interpreter's lock, milliseconds.
 const ASKED_EVERY_MS: u64 = 20;
 
-/// Watch over work that runs without the interpreter's lock.
+/// Supervision of work that runs without the interpreter's lock: Ctrl-C, a time limit, and a stop function.
 pub struct Watch {
     started: Instant,
     limit: Option<Duration>,

@@ -2,7 +2,8 @@
 
 use super::wire::Wire;
 
-/// Messages and their fields in `.proto` syntax. A field of message type refers to another file.
+/// Messages by name, with their fields in `.proto` syntax. A field of message type refers to the file of that
+/// message.
 pub const MESSAGES: [(&str, &str); 22] = [
     ("google.protobuf.Timestamp", "int64 seconds = 1; int32 nanos = 2"),
     ("foxglove.Vector3", "double x = 1; double y = 2; double z = 3"),
@@ -95,7 +96,7 @@ pub struct Field {
     name: &'static str,
     kind: u64,
     repeated: bool,
-    /// Name of its message or enumeration type; none for scalars.
+    /// Name of the field's message or enumeration type; `None` for scalars.
     of: Option<&'static str>,
 }
 
@@ -104,7 +105,7 @@ pub fn fields(message: &str) -> Vec<Field> {
     listed.split(';').filter_map(field).collect()
 }
 
-/// Reads a field as `repeated TYPE NAME = NUMBER`, with `enum` before the type of an enumeration.
+/// Parses a field `repeated TYPE NAME = NUMBER`, with `enum` before an enumeration type; `None` if malformed.
 pub fn field(text: &'static str) -> Option<Field> {
     let (before, number) = text.split_once('=')?;
     let words: Vec<&'static str> = before.split_whitespace().collect();
@@ -120,7 +121,7 @@ pub fn field(text: &'static str) -> Option<Field> {
     })
 }
 
-/// Message types of the fields of a message.
+/// Names of the message types of a message's fields.
 fn needs(message: &str) -> Vec<&'static str> {
     fields(message).into_iter().filter(|f| f.kind == MESSAGE).filter_map(|f| f.of).collect()
 }
@@ -132,7 +133,7 @@ fn file_name(message: &str) -> String {
     }
 }
 
-/// The `FileDescriptorSet` of a message and its dependencies, dependencies first.
+/// Encodes the `FileDescriptorSet` of a message and its dependencies, dependencies first.
 pub fn set(message: &'static str) -> Vec<u8> {
     fn visit(message: &'static str, done: &mut Vec<&'static str>) {
         for needed in needs(message) {
@@ -151,7 +152,7 @@ pub fn set(message: &'static str) -> Vec<u8> {
     out.0
 }
 
-/// A `FileDescriptorProto` with one message.
+/// Writes a `FileDescriptorProto` with one message.
 fn write_file(file: &mut Wire, name: &str) {
     let (package, short) = name.rsplit_once('.').unwrap_or(("", name));
     file.text(1, &file_name(name));
@@ -177,7 +178,7 @@ fn write_file(file: &mut Wire, name: &str) {
     file.text(12, "proto3");
 }
 
-/// A `FieldDescriptorProto`.
+/// Writes a `FieldDescriptorProto`.
 fn write_field(out: &mut Wire, field: &Field) {
     const OPTIONAL: u64 = 1;
     const REPEATED: u64 = 3;

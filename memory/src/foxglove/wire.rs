@@ -35,7 +35,7 @@ impl Wire {
         self.0.extend_from_slice(&value.to_le_bytes());
     }
 
-    /// Writes packed doubles, zeros included.
+    /// Writes packed doubles, also zeros.
     pub fn doubles(&mut self, number: u32, values: &[f64]) {
         self.bytes_header(number, 8 * values.len() as u64);
         values.iter().for_each(|value| self.0.extend_from_slice(&value.to_le_bytes()));

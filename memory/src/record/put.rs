@@ -117,7 +117,7 @@ impl Record {
     /// True if a transform is not yet in the record.
     ///
     /// # Errors
-    /// If it is invalid, or contradicts a recorded one.
+    /// If the transform is invalid, or contradicts a recorded one.
     fn is_news(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {
         let stamp_ns = sample.stamp_ns;
         transforms::check(stamp_ns, parent, child, &sample.parent_from_child)?;
@@ -180,7 +180,7 @@ impl Record {
     }
 }
 
-/// The draft of an image record.
+/// Converts an image to the draft of a record.
 fn image_draft<'a>(stamp_ns: i64, frame: &str, image: Image<'a>, meta: Meta) -> Result<Draft<'a>, Error> {
     let (form, layout, data) = match image {
         Image::Compressed { format, data } => (Form::CompressedImage, json!({ "format": format }), data),

@@ -1,4 +1,4 @@
-//! Reading recorded sensor data: clouds and scans, with the poses of their time.
+//! Reading of recorded sensor data: clouds and laser sweeps, with the poses at their time.
 
 use super::{Record, kind};
 use crate::clouds::{self, CLOUD, Sensing};
@@ -15,7 +15,7 @@ use serde_json::Value;
 use std::sync::PoisonError;
 
 impl Record {
-    /// Reads a cloud and its sensor.
+    /// Reads a cloud, and the camera behind it.
     ///
     /// # Errors
     /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
@@ -30,7 +30,7 @@ impl Record {
         })
     }
 
-    /// Reads the sensor behind a cloud, without the cloud.
+    /// Reads the camera behind a cloud, without the cloud.
     ///
     /// # Errors
     /// [`Error::NoBlob`], [`Error::Damaged`].
@@ -44,8 +44,8 @@ impl Record {
         })
     }
 
-    /// View nearest to a time, with the camera's pose in `world` at the stamp of its cloud (paper
-    /// 004, section V, step 0).
+    /// View of the cloud nearest to a time in nanoseconds, with the camera's pose in `world` at the cloud's
+    /// stamp (paper 004, section V, step 0).
     ///
     /// # Errors
     /// [`Error::NotNear`] without a cloud within [`view_tolerance_ns`](crate::Options::view_tolerance_ns); a missing link or gap of the transforms of that time.
@@ -54,7 +54,7 @@ impl Record {
         self.view(&document, world)
     }
 
-    /// The laser sweep at a time, with the laser's pose in `world`.
+    /// Laser sweep at a time in nanoseconds, with the laser's pose in `world`.
     ///
     /// # Errors
     /// [`Error::NotNear`] without a sweep of that very time; a missing link or gap of the transforms of that time; [`Error::Damaged`].
@@ -91,8 +91,8 @@ impl Record {
         })
     }
 
-    /// Pose of a document's frame in `world` at its time, by the transforms of the robot that
-    /// recorded it.
+    /// Pose of a document's frame in `world` at the document's time, by the transforms of the robot that
+    /// recorded the document.
     ///
     /// # Errors
     /// An error that names the missing link, or the gap.
@@ -101,7 +101,7 @@ impl Record {
         Ok(around.lookup(world, &document.frame, document.stamp_ns, self.options.reach)?)
     }
 
-    /// `target_from_origin` at a time, interpolated through the tree of that time.
+    /// Transform from `origin` to `target` at a time in nanoseconds, interpolated.
     ///
     /// # Errors
     /// An error that names the missing link, or the gap.
@@ -109,7 +109,7 @@ impl Record {
         Ok(self.transforms_around(stamp_ns)?.lookup(target, origin, stamp_ns, self.options.reach)?)
     }
 
-    /// The transforms relevant at a time: those measured around it, and the static ones.
+    /// All transforms that matter at a time in nanoseconds: those measured around it, and the static ones.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -117,7 +117,7 @@ impl Record {
         self.transforms_of(&self.options.robot, stamp_ns)
     }
 
-    /// The transforms of a robot, or of all robots if `robot` is empty.
+    /// Transforms that matter at a time, of one robot, or of all robots if `robot` is empty.
     fn transforms_of(&self, robot: &str, stamp_ns: i64) -> Result<Transforms, Error> {
         self.flusher.drain()?;
         let of = |kind: &str| Query { robot: named(robot), ..Query::of_kind(kind) };
@@ -157,8 +157,8 @@ impl Record {
         Ok(around)
     }
 
-    /// These records, and for each cloud or sweep also the transforms up to its time and the images of its
-    /// moment, which are needed to place and to colour it.
+    /// These records, and for each cloud or laser sweep also the transforms up to its time and the images of
+    /// its time, which are needed to place and to colour it.
     pub(super) fn with_their_place(&self, ids: &[RecordId]) -> Result<Vec<RecordId>, Error> {
         let mut all = ids.to_vec();
         for id in ids {
@@ -187,7 +187,7 @@ impl Record {
         Ok(all)
     }
 
-    /// Parent frame and samples of recorded transforms.
+    /// Parent frame and samples of a document of transforms.
     fn samples(&self, document: &Document) -> Result<(String, Vec<Sample>), Error> {
         let damaged = |what: &str| Error::Damaged {
             place: format!("record {}", document.id).into(),
@@ -205,11 +205,11 @@ impl Record {
         Ok((parent.to_owned(), samples))
     }
 
-    /// True if the retraced record holds this transform already.
+    /// True if the record that is being repeated holds this transform already.
     ///
     /// # Errors
-    /// [`Error::Input`] if it holds a different one at that time: data placed by one would be misplaced by
-    /// the other.
+    /// [`Error::Input`] if the record holds a different transform at that time: data placed by one would be
+    /// misplaced by the other.
     pub(super) fn is_measured(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {
         let stamp_ns = sample.stamp_ns;
         if self.retrace.as_ref().is_none_or(|r| stamp_ns > r.newest_ns) {
@@ -239,10 +239,10 @@ impl Record {
     }
 }
 
-/// Maximum difference between entries of equal transform matrices, after writing and reading.
+/// Maximum difference between entries of transform matrices that count as equal, after writing and reading.
 const SAME_TRANSFORM: f64 = 1e-6;
 
-/// The robot condition of a query; none for an empty name.
+/// Condition of a query on the robot; `None` for an empty name.
 pub(super) fn named(robot: &str) -> Option<String> {
     (!robot.is_empty()).then(|| robot.to_owned())
 }

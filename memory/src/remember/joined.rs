@@ -1,5 +1,5 @@
-//! Merges the memory of a run with the memory that other runs have written into the same store since the run
-//! began.
+//! Merging of what a run leaves for later runs with what other runs have written into the same store since
+//! the run began.
 
 use std::collections::BTreeMap;
 
@@ -9,9 +9,9 @@ use serde_json::Value;
 use super::{MOST_GONE, Recollection, Remembered, SAME_M};
 use crate::learned::{LearnedThing, Visited};
 
-/// Author of a change since a run began.
+/// Author of a change to a part of the store since a run began.
 enum Changed {
-    /// None, or the run alone.
+    /// Nobody, or the run alone.
     Here,
     /// Other runs alone.
     Elsewhere,
@@ -28,10 +28,10 @@ fn changed<T: PartialEq>(before: &T, others: &T, after: &T) -> Changed {
 }
 
 impl Remembered {
-    /// Merges this memory of a store with that of a run, which began with `before` at `began_unix_s` and ends
-    /// with `after`. Memory that other runs wrote meanwhile and given names stay; the run adds what it
-    /// learned and saw. A surface keeps the memory of its last look. Of two maps made meanwhile, the one from
-    /// more looks stays, with the objects seen on it.
+    /// Merges this content of a store with that of a run, which began with `before` at `began_unix_s` and
+    /// ends with `after`. What other runs wrote meanwhile, and given names, stay; the run adds what it
+    /// learned and saw. Each surface is kept as last viewed. If the run and others built a map meanwhile, the
+    /// map from more views stays, with the objects seen on it.
     pub fn joined(&self, before: &Self, mut after: Self, began_unix_s: f64) -> Self {
         self.give_names(&mut after);
         let looks = |of: &Self| of.surveyed.as_ref().map_or(0, |map| map.stood.len());
@@ -53,7 +53,8 @@ impl Remembered {
         }
     }
 
-    /// Memory of further abilities: of each that the run has changed what the run leaves, of any other what is in the store.
+    /// Merges the data that other abilities keep: from the run for each ability whose data the run has
+    /// changed, else from the store.
     fn besides_of(&self, before: &Self, after: &Self) -> BTreeMap<String, Value> {
         let is_new = |(name, kept): &(&String, &Value)| before.besides.get(*name) != Some(*kept);
         let ours = after.besides.iter().filter(is_new).map(|(name, kept)| (name.clone(), kept.clone()));
@@ -81,7 +82,7 @@ impl Remembered {
         after.call(|name| names.get(name).cloned());
     }
 
-    /// Learned objects of both. Of two models of one object, that of the later encounter stays.
+    /// Merges the learned objects; of two models of one object, that of the later encounter stays.
     fn learned(&self, before: &Self, after: &Self) -> Vec<LearnedThing> {
         let (earlier, ours) = (marked(&before.things), marked(&after.things));
         let here = marked(&self.things);
@@ -105,7 +106,7 @@ impl Remembered {
         order.filter_map(|mark| all.remove(&mark)).collect()
     }
 
-    /// Visited places of both, each as of its last visit.
+    /// Merges the visited places, each as of its last visit.
     fn visits(&self, before: &Self, after: &Self) -> Vec<Visited> {
         let of = |all: &Self, waypoint: &str| all.visited.iter().find(|v| v.waypoint == waypoint).cloned();
         let is_ours = |waypoint: &str| {
@@ -121,7 +122,7 @@ impl Remembered {
         theirs.chain(after.visited.iter().filter(|v| is_ours(&v.waypoint))).cloned().collect()
     }
 
-    /// Merges the objects: each surface as of its last look, then the vanished objects; everything else from
+    /// Merges the objects, each surface as last viewed, and the vanished objects; everything else is from
     /// `self`.
     fn places(&self, before: &Self, after: &Self, began_unix_s: f64) -> Self {
         let on = |all: &Self, surface: &str| -> Vec<Recollection> {
@@ -161,8 +162,8 @@ impl Remembered {
     }
 }
 
-/// Identity of a learned object independent of its name: time of learning, and index among those learned at
-/// that time.
+/// Identity of a learned object, whatever its name: time of learning, and index among those learned at that
+/// time.
 type Mark = (u64, usize);
 
 fn marks(things: &[LearnedThing]) -> Vec<Mark> {

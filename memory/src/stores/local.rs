@@ -62,14 +62,14 @@ impl Default for LocalOptions {
     }
 }
 
-/// Damage that opening found and repaired.
+/// Damage that was found when the store was opened, and repaired as far as possible.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recovery {
     /// Number of undamaged records in segments that were missing in the index.
     pub regained: u64,
-    /// Bytes dropped behind the last complete record.
+    /// Number of bytes dropped behind the last complete record.
     pub dropped_bytes: u64,
-    /// Records in the index that are not on the disk, for each segment: a power cut costs them under
+    /// Records that the index has and the disk does not, for each segment: a power cut may lose them under
     /// [`Durability::Process`].
     pub lost: Vec<Fault>,
     /// True if the index was damaged and rebuilt from the segments.
@@ -81,7 +81,7 @@ pub struct Recovery {
 /// State of the writing process.
 struct WriteState {
     segment: Segment,
-    /// Segment that receives the pinned records of pruned segments.
+    /// Segment that receives the pinned records of pruned segments, once there is one.
     kept: Option<Segment>,
     next_id: RecordId,
     next_segment: u64,
@@ -127,8 +127,8 @@ impl LocalStore {
         Self::to_write(dir, robot, options, writing)
     }
 
-    /// Opens a store for writing (by its folder, or by that of a run that holds it as `record`) and repairs
-    /// the traces of a crash.
+    /// Opens a store for writing and repairs the traces of a crash. `dir` is its folder, or that of a run
+    /// that holds it as `record`.
     ///
     /// # Errors
     /// [`Error::NoRecord`], [`Error::InUse`], [`Error::Faulty`] if anything is lost, or what the system
@@ -187,12 +187,12 @@ impl LocalStore {
         })
     }
 
-    /// Damage that opening found and repaired.
+    /// Damage that was found when the store was opened.
     pub fn recovery(&self) -> &Recovery {
         &self.recovery
     }
 
-    /// The folder.
+    /// Folder of the store.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
@@ -209,7 +209,7 @@ impl LocalStore {
         unpoisoned(&self.index)
     }
 
-    /// Writes an already numbered batch, regardless of limits.
+    /// Writes a batch of numbered records, regardless of limits.
     fn write(&self, writer: &mut WriteState, batch: &[Encoded]) -> Result<(), Error> {
         if writer.segment.is_long(self.options.segment_bytes) {
             self.roll(writer)?;
@@ -245,7 +245,7 @@ impl LocalStore {
         self.index().seal(number, bytes)
     }
 
-    /// Reads and verifies the bytes at a spot in a record.
+    /// Reads and verifies `length` bytes of a record at a spot.
     fn read(&self, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
         let path = segment_path(&self.dir, place.segment);
         read_at(&*self.file(place, &path)?, &path, place, spot, length)
@@ -273,7 +273,7 @@ impl LocalStore {
         document_at(&*self.file(place, &path)?, &path, place)
     }
 
-    /// Pins records, in addition to the pins of `by` or instead of them.
+    /// Pins records on behalf of `by`, in place of the former pins of `by` if `instead`.
     fn pin_records(&self, ids: &[RecordId], by: &str, instead: bool) -> Result<(), Error> {
         let mut writer = self.writer()?;
         for id in ids {
@@ -288,7 +288,7 @@ impl LocalStore {
         self.index().place(id)?.ok_or(Error::Missing { id: id.0 })
     }
 
-    /// Reads at a place, following the record if it was moved; none if it was pruned in between.
+    /// Reads a record at a place, or at the new place if it was moved since; `None` if it was pruned since.
     fn at<T>(&self, place: &Place, read: impl Fn(&Place) -> Result<T, Error>) -> Result<Option<T>, Error> {
         match read(place) {
             Err(Error::Missing { id }) => match self.index().place(RecordId(id))? {
@@ -479,7 +479,7 @@ impl LocalStore {
     }
 }
 
-/// Reads and verifies the bytes at a spot in a segment.
+/// Reads and verifies `length` bytes of a segment at a spot.
 fn read_at(file: &File, path: &Path, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
     let damaged = |what: String| Error::Damaged {
         place: path.to_owned(),
@@ -513,7 +513,7 @@ fn document_at(file: &File, path: &Path, place: &Place) -> Result<Document, Erro
     Ok(document)
 }
 
-/// Acquires a lock whose holder may have panicked; the guarded data is verified on the disk anyway.
+/// Acquires a lock even if a holder panicked, since the guarded data is verified on the disk anyway.
 fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -526,13 +526,13 @@ fn segment_path(dir: &Path, number: u64) -> PathBuf {
     segment_dir(dir).join(format!("{number:08}.mcap"))
 }
 
-/// Folder of a record: the given one, or `record` in the folder of a run.
+/// Folder of a store: the given one, or `record` in the folder of a run.
 fn folder(named: &Path) -> Result<PathBuf, Error> {
     let found = [named.to_owned(), named.join("record")].into_iter().find(|dir| segment_dir(dir).is_dir());
     found.ok_or_else(|| Error::NoRecord { place: named.to_owned(), expected: "segments" })
 }
 
-/// Creates a segment; its directory entry is on the disk before anything in it is acknowledged.
+/// Creates a segment and syncs its folder, so that the file is found after a power cut.
 fn new_segment(dir: &Path, number: u64) -> Result<Segment, Error> {
     let path = segment_path(dir, number);
     let made = Segment::create(&path, number).and_then(|segment| {

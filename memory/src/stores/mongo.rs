@@ -32,7 +32,7 @@ use std::io::Read;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-/// Timeout for an answer of the server.
+/// Maximum time for an answer of the server.
 const SERVER_WAIT: Duration = Duration::from_secs(5);
 /// Default database name.
 const DATABASE: &str = "descry";
@@ -40,8 +40,8 @@ const DATABASE: &str = "descry";
 /// Options of a store in MongoDB.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MongoOptions {
-    /// Name of the robot: one process at a time writes under a name. Queries without a robot, counts, limits
-    /// and verification concern the records of that name; all records if it is "".
+    /// Name of the robot; one process at a time writes under a name. Queries without a robot, counts, limits
+    /// and verification concern the records of that name, or all records if it is "".
     pub robot: String,
     /// Condition for acknowledging a write: in the journal of a majority of servers, or in the memory of one.
     pub durability: Durability,
@@ -60,7 +60,7 @@ pub struct MongoStore {
     records: Collection<Fields>,
     names: Collection<Fields>,
     files: GridFsBucket,
-    /// Bytes written since the limits were checked.
+    /// Number of bytes written since the limits were checked.
     unchecked: AtomicU64,
 }
 
@@ -165,7 +165,7 @@ impl MongoStore {
         self.said(self.records.create_indexes(indexes).run()).map(|_| ())
     }
 
-    /// Translates driver errors into those of this crate.
+    /// Converts an error of the driver to one of this crate.
     fn said<T>(&self, answer: mongodb::error::Result<T>) -> Result<T, Error> {
         /// Error code `OutOfDiskSpace`.
         const NO_ROOM: i32 = 14031;
@@ -186,7 +186,7 @@ impl MongoStore {
         Error::Remote { place: self.place.clone(), because: because.to_string() }
     }
 
-    /// Filter for the complete records in the scope of this store.
+    /// Filter for the complete records of this store's robot, or of all robots if it has no name.
     fn own(&self) -> Fields {
         query::filter(&Query::default(), &self.name)
     }
@@ -207,7 +207,7 @@ impl MongoStore {
         self.said(self.records.find_one(this).run())?.ok_or(Error::Missing { id: id.0 })
     }
 
-    /// Reads and verifies the `n`-th blob of a record.
+    /// Reads and verifies the `n`-th blob of a record, from 0.
     fn whole_blob(
         &self,
         document: &Document,
@@ -227,7 +227,8 @@ impl MongoStore {
         Ok(bytes)
     }
 
-    /// First matching document in ascending (`sign` 1) or descending (-1) time order.
+    /// First document that matches a query and a further condition, in ascending (`sign` 1) or descending
+    /// (-1) order of time.
     fn first(&self, query: &Query, side: Fields, sign: i32) -> Result<Option<Document>, Error> {
         let filter = doc! { "$and": [query::filter(query, &self.name), side] };
         let mut find = self.records.find(filter).sort(doc! { "stamp_ns": sign, "_id": sign });
@@ -271,14 +272,14 @@ fn number_of(fields: &Fields) -> Option<i64> {
     fields.get_i64("_id").ok()
 }
 
-/// File ID and checksum of the `n`-th blob of a record.
+/// File ID and checksum of the `n`-th blob of a record, from 0; `None` without one.
 fn file_of(fields: &Fields, n: usize) -> Option<(ObjectId, Option<u32>)> {
     let blob = fields.get_array("blobs").ok()?.get(n)?.as_document()?;
     let crc32 = blob.get_i64("crc32").ok().and_then(|c| u32::try_from(c).ok());
     Some((blob.get_object_id("file").ok()?, crc32))
 }
 
-/// Converts any BSON integer.
+/// Converts any BSON number to an integer; `None` for other values.
 fn whole(value: &Bson) -> Option<i64> {
     match value {
         Bson::Int32(n) => Some(i64::from(*n)),
@@ -288,7 +289,7 @@ fn whole(value: &Bson) -> Option<i64> {
     }
 }
 
-/// Runs work on a thread of its own: the driver blocks, which is not allowed in asynchronous tasks.
+/// Runs work on a thread of its own, since the driver blocks, which is not allowed in asynchronous tasks.
 fn apart<T: Send>(work: impl FnOnce() -> Result<T, Error> + Send) -> Result<T, Error> {
     std::thread::scope(|scope| scope.spawn(work).join()).unwrap_or_else(|_| {
         Err(Error::Remote { place: "MongoDB".into(), because: "the driver failed".into() })

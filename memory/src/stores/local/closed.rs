@@ -8,7 +8,7 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-/// File name. The file exists while no process writes, and not after a crash.
+/// Name of the file, which exists while no process writes, and not after a crash.
 const CLOSED: &str = "closed.json";
 
 /// State of the store when it was closed.
@@ -43,7 +43,7 @@ impl Closed {
         fs::rename(&fresh, &path).map_err(fail)
     }
 
-    /// Reads the state; none during writing, after a crash, or if it is damaged.
+    /// Reads the state; `None` while a process writes, after a crash, or if the file is damaged.
     pub fn read(dir: &Path) -> Option<Self> {
         let said = fs::read_to_string(dir.join(CLOSED)).ok()?;
         let (text, sum) = said.strip_suffix('\n')?.split_once('\n')?;
@@ -51,12 +51,12 @@ impl Closed {
         serde_json::from_str(text).ok()
     }
 
-    /// True if the index is unchanged.
+    /// True if the index is unchanged since the store was closed.
     pub fn has_index(&self, dir: &Path) -> bool {
         sums(dir).is_ok_and(|found| found == self.index)
     }
 
-    /// Removes the state, as a process starts to write.
+    /// Removes the file of the state, when a process begins to write.
     pub fn remove(dir: &Path) -> Result<(), Error> {
         let path = dir.join(CLOSED);
         match fs::remove_file(&path) {
@@ -66,7 +66,7 @@ impl Closed {
     }
 }
 
-/// Sums of the index and its write-ahead log; a missing log counts as empty.
+/// Sizes and checksums of the index and its write-ahead log; a missing log counts as empty.
 fn sums(dir: &Path) -> std::io::Result<[Sum; 2]> {
     let log = match sum(&dir.join(format!("{INDEX}-wal"))) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Sum::default(),

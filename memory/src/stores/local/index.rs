@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// File name.
+/// Name of the index file.
 pub(super) const INDEX: &str = "index.sqlite";
 /// Version of the file format; an older index is rebuilt, a newer one is refused.
 const FORMAT: i64 = 2;
@@ -54,7 +54,7 @@ pub(super) struct SegmentRow {
     pub number: u64,
     pub bytes: u64,
     pub sealed: bool,
-    /// True if its deletion was under way.
+    /// True if the segment is marked for deletion.
     pub going: bool,
 }
 
@@ -179,8 +179,8 @@ impl Index {
         })
     }
 
-    /// The oldest complete segment, by its newest record, among those with any unpinned record; and that
-    /// record's stamp.
+    /// Oldest complete segment that has an unpinned record, or no record, in order of the newest record of
+    /// each: its number, and the stamp of its newest record in nanoseconds, -1 without records.
     pub fn oldest_segment(&self) -> Result<Option<(u64, i64)>, Error> {
         let sql = "SELECT s.number, coalesce((SELECT max(stamp) FROM records WHERE segment = s.number), -1) AS newest FROM segments s
             WHERE s.sealed AND NOT s.going AND (
@@ -191,7 +191,7 @@ impl Index {
         statement.query_row([], |r| Ok((unsigned(r, 0)?, r.get(1)?))).optional().map_err(|e| self.err(e))
     }
 
-    /// Latest end of the records of a segment, nanoseconds.
+    /// Latest end of the records of a segment, nanoseconds; `None` without records.
     pub fn lasts_until(&self, segment: u64) -> Result<Option<i64>, Error> {
         let sql = "SELECT max(coalesce(ends, stamp)) FROM records WHERE segment = ?1";
         self.db.query_row(sql, [segment as i64], |r| r.get(0)).map_err(|e| self.err(e))
@@ -247,7 +247,7 @@ impl Index {
         self.db.execute(sql, [next.0 as i64]).map(|_| ()).map_err(|e| self.err(e))
     }
 
-    /// Rebuilds the pins from these records, which are all that concern pins, ordered by number.
+    /// Rebuilds the pins from documents that change pins: `said` are all of them, in order of number.
     pub fn pin_again(&mut self, said: &[Document]) -> Result<(), Error> {
         let dir = self.dir.clone();
         let result = (|| -> rusqlite::Result<()> {
@@ -271,7 +271,7 @@ impl Index {
         self.db.query_row(sql, [], |r| unsigned(r, 0)).map(RecordId).map_err(|e| self.err(e))
     }
 
-    /// Location of a record.
+    /// Location of a record; `None` if there is no such record.
     pub fn place(&self, id: RecordId) -> Result<Option<Place>, Error> {
         let sql = format!("SELECT {PLACE} FROM records WHERE id = ?1");
         let mut statement = self.db.prepare_cached(&sql).map_err(|e| self.err(e))?;
@@ -304,7 +304,7 @@ impl Index {
         self.rows(&sql, params_from_iter(values), place)
     }
 
-    /// Location of the record nearest in time.
+    /// Location of the record nearest in time among those that match a query; `None` if none matches.
     pub fn nearest(&self, query: &Query, stamp_ns: i64) -> Result<Option<Place>, Error> {
         let (select, values) = self.select(query);
         let one = |end: &str| -> Result<Option<Place>, Error> {
@@ -408,7 +408,7 @@ impl Index {
         result.map_err(|e| Error::index(&dir, e))
     }
 
-    /// The pinned records, with the holders of the pins.
+    /// Numbers of the pinned records, with the names of the holders of the pins.
     pub fn pins(&self) -> Result<BTreeMap<RecordId, BTreeSet<String>>, Error> {
         let mut pins: BTreeMap<RecordId, BTreeSet<String>> = BTreeMap::new();
         let mut read = || -> rusqlite::Result<()> {
@@ -423,7 +423,8 @@ impl Index {
         Ok(pins)
     }
 
-    /// The holders of pins with the number and bytes of their records, largest first.
+    /// Names of the holders of pins, with the number and the bytes of the records that each holds, largest
+    /// first.
     pub fn holders(&self) -> Result<Vec<(String, u64, u64)>, Error> {
         let sql = "SELECT holder, count(*), sum(bytes) FROM pins JOIN records ON id = record GROUP BY holder ORDER BY 3 DESC, 1";
         self.rows(sql, [], |r| Ok((r.get(0)?, unsigned(r, 1)?, unsigned(r, 2)?)))

@@ -6,18 +6,18 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Locks that a writer holds.
+/// Locks that a writer holds while it exists.
 pub(super) struct Writing {
     _lock: File,
-    /// Lock that readers test for a writer.
+    /// Lock by which readers test for a writer.
     _alive: Option<File>,
 }
 
-/// Lock that excludes other writers.
+/// Name of the lock file that excludes other writers.
 const LOCK: &str = "lock";
-/// Lock that the writer holds as well; a reader tries it briefly.
+/// Name of the lock file that a writer holds as well, and readers try briefly.
 const ALIVE: &str = "alive";
-/// Maximum number of tries of the lock, a millisecond apart: a reader holds it only for a moment.
+/// Maximum number of tries of the second lock, a millisecond apart: a reader holds it only for a moment.
 const TRIES: usize = 1000;
 
 /// Acquires the locks of the writer.

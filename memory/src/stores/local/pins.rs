@@ -5,14 +5,14 @@ use crate::stores::{KEPT, PIN, UNPIN};
 use rusqlite::{Transaction, params};
 use serde_json::json;
 
-/// A document that pins records on behalf of `by`, in addition to its pins or instead of them.
+/// Draft of a document that pins records on behalf of `by`, in place of the former pins of `by` if `instead`.
 pub(crate) fn pinned(stamp_ns: i64, ids: &[RecordId], by: &str, instead: bool) -> Draft<'static> {
     let mut draft = Draft::new(PIN, stamp_ns);
     draft.meta.body = json!({ "records": ids, "by": by, "instead": instead });
     draft
 }
 
-/// A document that removes all pins of `by`.
+/// Draft of a document that removes all pins of `by`.
 pub(crate) fn unpinned(stamp_ns: i64, by: &str) -> Draft<'static> {
     let mut draft = Draft::new(UNPIN, stamp_ns);
     draft.meta.body = json!({ "by": by });
@@ -24,7 +24,8 @@ pub(super) fn speaks(document: &Document) -> bool {
     document.kept || [PIN, UNPIN].contains(&document.kind.as_str())
 }
 
-/// Applies the pins of a document to the index. A document that pins records is pinned itself.
+/// Applies the pins that a document adds or removes to the index. A document that pins records is pinned
+/// itself.
 pub(super) fn apply(tx: &Transaction, document: &Document) -> rusqlite::Result<()> {
     if document.kept {
         tx.prepare_cached("INSERT OR IGNORE INTO pins VALUES(?1, ?2)")?

@@ -8,7 +8,7 @@ use crate::stores::Retention;
 use std::fs;
 use std::path::Path;
 
-/// Free room on the disk of a folder, bytes.
+/// Free room on the disk that holds a folder, bytes.
 ///
 /// # Errors
 /// [`Error::File`] if the system cannot report it.
@@ -22,7 +22,7 @@ impl LocalStore {
     /// Makes room for drafts, under a size limit.
     ///
     /// # Errors
-    /// [`Error::Bounded`] if pinned records, and those of the same moment, leave too little.
+    /// [`Error::Bounded`] if pinned records, and records with data up to `now_ns`, leave too little.
     pub(super) fn make_room(
         &self,
         writer: &mut WriteState,
@@ -55,8 +55,8 @@ impl LocalStore {
         Ok(())
     }
 
-    /// Deletes segments until the limits hold or nothing is left to delete; segments with data up to `now_ns`
-    /// stay. Returns the number of removed records.
+    /// Deletes the oldest segments until the limits hold or none can be deleted; segments with data up to
+    /// `now_ns` or later stay. Returns the number of removed records.
     pub(super) fn keep_within(
         &self,
         writer: &mut WriteState,
@@ -94,14 +94,15 @@ impl LocalStore {
         Ok(false)
     }
 
-    /// Total size on the disk, the index included, bytes.
+    /// Total size of the store on the disk, the index included, bytes.
     fn bytes(&self, writer: &WriteState) -> u64 {
         let kept = writer.kept.as_ref().map_or(0, |k| k.end);
         writer.sealed_bytes + writer.segment.end + kept + self.index_bytes()
     }
 
-    /// Deletes the oldest segment with any unpinned record; `None` if there is none, or if it holds data up
-    /// to `now_ns`: a cloud must not push out the transforms of its own time before both can be pinned.
+    /// Deletes the oldest segment that has an unpinned record and returns the number of removed records;
+    /// `None` if there is none, or if its data reaches `now_ns`: a cloud must not push out the transforms of
+    /// its own time before both can be pinned.
     pub(super) fn drop_oldest(&self, writer: &mut WriteState, now_ns: i64) -> Result<Option<u64>, Error> {
         let Some((number, _)) = self.index().oldest_segment()? else { return Ok(None) };
         if self.index().lasts_until(number)?.is_some_and(|until| until >= now_ns) {
@@ -121,7 +122,7 @@ impl LocalStore {
         self.index().forget(number).map(Some)
     }
 
-    /// Copies the pinned records of a segment to the keeping segment, one record at a time.
+    /// Copies the pinned records of a segment to the segment for pinned records, one record at a time.
     fn carry_pinned(&self, writer: &mut WriteState, number: u64) -> Result<(), Error> {
         let places = self.index().places(number, true)?;
         if places.is_empty() {
@@ -168,7 +169,7 @@ impl LocalStore {
         size("") + size("-wal") + size("-shm")
     }
 
-    /// Total size of the files in the folder, bytes.
+    /// Total size of the segments and the index on the disk, bytes.
     pub(super) fn bytes_on_disk(&self) -> Result<u64, Error> {
         let segments = self.index().segments()?;
         let size = |number| fs::metadata(segment_path(&self.dir, number)).map_or(0, |m| m.len());

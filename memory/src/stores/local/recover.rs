@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// An opened store, with the damage found.
+/// An opened store, with the damage that was found.
 pub(super) struct Opened {
     pub index: Index,
     /// Length of each segment, bytes, by number.
@@ -25,8 +25,8 @@ pub(super) struct Opened {
     pub recovery: Recovery,
 }
 
-/// Maximum number of looks at a store that seems neither written nor closed, since it may be in the middle of
-/// opening or closing.
+/// Maximum number of attempts to read a store that seems neither written nor closed, since it may be opening
+/// or closing right now.
 const LOOKS: usize = 3;
 
 /// Opens a store for this process alone to write, and repairs the traces of a crash. `written` is the
@@ -56,7 +56,8 @@ pub(super) fn for_writing(dir: &Path, log_bytes: u64, written: Durability) -> Re
     Ok(opened)
 }
 
-/// A refusal with the losses that a reader finds: records that the index proves undamaged are none.
+/// Replaces the faults of a refusal to write by those that a reader finds, since the old index may prove some
+/// records undamaged.
 fn as_read(dir: &Path, refused: Error) -> Error {
     let Error::Faulty { place, faults } = refused else { return refused };
     let read = Old::read(dir, Closed::read(dir))
@@ -65,14 +66,14 @@ fn as_read(dir: &Path, refused: Error) -> Error {
     Error::Faulty { place, faults: if found.is_empty() { faults } else { found } }
 }
 
-/// Suffix of the old index during a rebuild.
+/// Suffix of the old index's files during a rebuild.
 const OLD: &str = ".old";
 
 fn index_files(dir: &Path, ending: &str) -> [PathBuf; 3] {
     ["", "-wal", "-shm"].map(|suffix| dir.join(format!("{INDEX}{suffix}{ending}")))
 }
 
-/// Renames the files of the index, replacing existing ones.
+/// Renames the files of the index from one suffix to another, replacing existing files.
 fn move_index(dir: &Path, from: &str, to: &str) -> Result<(), Error> {
     for (from, to) in index_files(dir, from).iter().zip(index_files(dir, to)) {
         let gone = if from.exists() { fs::rename(from, &to) } else { fs::remove_file(&to) };
@@ -119,7 +120,7 @@ pub(super) fn for_reading(dir: &Path) -> Result<Opened, Error> {
     Rebuild::new(dir, Index::in_memory(dir)?, old, None).run()
 }
 
-/// True if the index equals its state at closing, and no segment is new.
+/// True if the index equals its state at closing, and no segment was added since.
 fn is_as_closed(dir: &Path, closed: &Closed) -> bool {
     let known = |number: &u64| closed.segments.contains_key(number);
     closed.has_index(dir) && on_disk(dir).is_ok_and(|found| found.numbers.iter().all(known))
@@ -162,12 +163,12 @@ fn stray(path: &Path) -> Fault {
     Fault { record: None, place: path.display().to_string(), what: what.into() }
 }
 
-/// Length of a segment, bytes; none if it is missing or no regular file.
+/// Length of a segment, bytes; `None` if it is missing or is no regular file.
 fn length(dir: &Path, number: u64) -> Option<u64> {
     fs::metadata(segment_path(dir, number)).ok().filter(fs::Metadata::is_file).map(|m| m.len())
 }
 
-/// Checks the segments against a trusted index.
+/// Opens a store by its trusted index, and checks that the segments are as the index says.
 fn look_over(dir: &Path, index: Index) -> Result<Opened, Error> {
     let mut recovery = Recovery { faults: on_disk(dir)?.strays, ..Recovery::default() };
     let rows = index.segments()?;
@@ -199,7 +200,7 @@ fn fault(dir: &Path, segment: u64, what: String) -> Fault {
     Fault { record: None, place: segment_path(dir, segment).display().to_string(), what }
 }
 
-/// The numbers of lost records, as text with ranges.
+/// Numbers of lost records as text, with ranges.
 fn lost_text(lost: &BTreeSet<RecordId>) -> String {
     let mut ranges: Vec<(u64, u64)> = Vec::new();
     for id in lost {
@@ -220,20 +221,22 @@ fn lost_text(lost: &BTreeSet<RecordId>) -> String {
     }
 }
 
-/// Remains of an index that is to be rebuilt, as far as they are readable.
+/// Readable remains of an index that is to be rebuilt.
 #[derive(Default)]
 struct Old {
     closed: Option<Closed>,
     is_current: bool,
-    /// Index itself; readers only.
+    /// The old index itself, kept open for readers only.
     index: Option<Index>,
     rows: BTreeMap<u64, SegmentRow>,
-    /// Records of each segment.
+    /// Numbers of the records of each segment, by segment.
     records: BTreeMap<u64, BTreeSet<RecordId>>,
     next: u64,
 }
 
 impl Old {
+    /// Reads what remains of the index of a store.
+    ///
     /// # Errors
     /// [`Error::Damaged`] for an index of a newer version.
     fn read(dir: &Path, closed: Option<Closed>) -> Result<Self, Error> {
@@ -252,20 +255,19 @@ impl Old {
         Ok(old)
     }
 
-    /// Locations in the index of some records of a segment.
+    /// Locations of some records of a segment, as far as the old index has them.
     fn places(&self, segment: u64, ids: &BTreeSet<RecordId>) -> Vec<Place> {
         let places = self.index.as_ref().and_then(|index| index.places(segment, false).ok());
         places.unwrap_or_default().into_iter().filter(|place| ids.contains(&place.id)).collect()
     }
 
-    /// Length of a segment that was complete, bytes.
+    /// Length of a segment that was complete, bytes; `None` for any other.
     fn sealed(&self, number: u64) -> Option<u64> {
         let row = self.rows.get(&number).filter(|row| row.sealed).map(|row| row.bytes);
         row.or_else(|| self.closed.as_ref()?.segments.get(&number).copied())
     }
 
-    /// The segments that should exist. One marked for deletion may be missing; if it exists, its records
-    /// count.
+    /// Numbers of the segments that must exist. A segment marked for deletion may be missing.
     fn expected(&self) -> BTreeSet<u64> {
         let closed = self.closed.iter().flat_map(|closed| closed.segments.keys());
         let all = closed.chain(self.rows.keys()).copied();
@@ -273,19 +275,19 @@ impl Old {
     }
 }
 
-/// Rebuild of an index.
+/// Rebuild of an index from the segments.
 struct Rebuild<'a> {
     dir: &'a Path,
     index: Index,
     old: Old,
-    /// Durability of repairs: torn segment ends are truncated and segments completed, unless a
-    /// record is damaged. `None`: nothing is repaired.
+    /// Durability of repairs, which truncate torn ends and complete segments unless a record is damaged;
+    /// `None` repairs nothing.
     mends: Option<Durability>,
     /// Segments with a torn end or without a summary.
     unfinished: Vec<(u64, Scan)>,
     segments: BTreeMap<u64, u64>,
     recovery: Recovery,
-    /// Documents that change pins.
+    /// Documents that change pins, by record number.
     of_pins: BTreeMap<RecordId, Document>,
     found: BTreeSet<RecordId>,
 }
@@ -334,7 +336,8 @@ impl<'a> Rebuild<'a> {
         Ok(Opened { index, segments, next_segment: last + 1, recovery })
     }
 
-    /// Counts regained and lost records, except losses that a fault already names.
+    /// Counts the regained records, and adds a fault if fewer records were found than the store had at
+    /// closing.
     fn count(&mut self, is_new: bool) {
         let known: BTreeSet<RecordId> = self.old.records.values().flatten().copied().collect();
         self.recovery.regained = self.found.difference(&known).count() as u64;
@@ -348,7 +351,7 @@ impl<'a> Rebuild<'a> {
         }
     }
 
-    /// Reads a segment into the index.
+    /// Reads the records of a segment into the index.
     fn read(&mut self, number: u64) -> Result<(), Error> {
         let path = segment_path(self.dir, number);
         let Some(bytes) = length(self.dir, number) else {
@@ -388,7 +391,7 @@ impl<'a> Rebuild<'a> {
         self.index.seal(number, bytes)
     }
 
-    /// Reports the faults of a segment.
+    /// Reports the faults of a segment that was read.
     fn judge(&mut self, number: u64, bytes: u64, scan: &Scan, lost: &BTreeSet<RecordId>) {
         let was_complete = self.old.sealed(number);
         let torn = scan.torn.iter().filter(|_| was_complete.is_some());
@@ -416,13 +419,13 @@ impl<'a> Rebuild<'a> {
         }
     }
 
-    /// The numbers of lost records of a segment, as text; empty if the index that knew them is gone.
+    /// Numbers of the lost records of a segment as text; empty if the index that knew them is gone.
     fn lost_text(&self, segment: u64, lost: &BTreeSet<RecordId>) -> String {
         let is_known = self.old.records.get(&segment).is_some_and(|known| !known.is_empty());
         if is_known { lost_text(lost) } else { String::new() }
     }
 
-    /// Adds records of damaged chunks that the checksums in the index prove undamaged.
+    /// Adds to the index the records of damaged chunks that the checksums of the old index prove undamaged.
     fn proven(
         &mut self,
         number: u64,

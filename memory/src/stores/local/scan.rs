@@ -1,9 +1,9 @@
-//! Sequential reading of a segment: every chunk with a valid checksum, wherever it stands.
+//! Sequential reading of a segment: every chunk with a valid checksum is found, wherever it stands.
 //!
-//! A segment is a sequence of self-validating chunks: the head gives the length three times, and a checksum
-//! covers the data. Where a chunk cannot be read, the bytes behind it are searched for the next valid one, so
-//! that damage costs the chunks it hits and no other. Damage is distinguished from the unfinished last write
-//! of a killed process.
+//! A segment is a sequence of self-validating chunks: the head of a chunk gives the length three times, and a
+//! checksum covers the data. Where a chunk cannot be read, the bytes behind it are searched for the next
+//! valid one, so that damage costs no chunks but those it hits. Damage is distinguished from the unfinished
+//! last write of a killed process.
 
 use super::segment::{
     CHUNK_HEAD, Channels, ChunkEntry, Located, MAGIC, MESSAGE_HEAD, RECORD_HEAD, Spot, message_index, op,
@@ -14,20 +14,20 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-/// Content of a segment.
+/// Content of a segment, as far as it can be read.
 #[derive(Default)]
 pub(super) struct Scan {
     /// End of the last complete chunk; bytes behind it belong to no record.
     pub end: u64,
     /// Bytes missing in the message index of the last chunk, because its write was cut off there.
     pub unwritten: Vec<u8>,
-    /// True if the summary follows.
+    /// True if the summary of the segment follows the chunks.
     pub complete: bool,
     pub channels: Channels,
     pub chunks: Vec<ChunkEntry>,
-    /// Unfinished last write: its offset, and the missing part.
+    /// Unfinished last write: its offset, and a description of what is missing.
     pub torn: Option<Fault>,
-    /// Damage not explained by an unfinished write: its offset, and the loss.
+    /// Damage that no unfinished write explains: each with its offset and a description.
     pub damaged: Vec<Fault>,
     /// Highest record number read so far.
     last: Option<u64>,
@@ -48,7 +48,7 @@ pub(super) fn is_mcap(path: &Path) -> bool {
     is_file && Bytes::open(path).is_ok_and(|bytes| bytes.read(0, 8).is_ok_and(|found| found == MAGIC))
 }
 
-/// Size of a read in the search for the next chunk, bytes.
+/// Number of bytes that are read at once in the search for the next chunk.
 const WINDOW: u64 = 1 << 20;
 
 impl Bytes {
@@ -67,7 +67,7 @@ impl Bytes {
         Ok(bytes)
     }
 
-    /// Code and length of the record at an offset.
+    /// Opcode and content length of the MCAP record at an offset.
     fn head(&self, at: u64) -> Result<(u8, u64), Fault> {
         let head = self.read(at, RECORD_HEAD)?;
         let length = number(&head, 1, 8);
@@ -90,7 +90,7 @@ impl Bytes {
     }
 }
 
-/// A little-endian number of `width` bytes; 0 if out of range.
+/// Reads a little-endian number of `width` bytes at an offset; 0 beyond the end.
 fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
     let slice = bytes.get(at..at + width).unwrap_or(&[]);
     match slice.try_into() {
@@ -101,15 +101,15 @@ fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
 
 /// Head of a chunk as stored.
 struct Head {
-    /// Size of the chunk's data, bytes, by each of the three fields that hold it.
+    /// Size of the chunk's data, bytes, as each of the three fields for it says.
     sizes: [Option<u64>; 3],
     times: (u64, u64),
     crc32: u32,
-    /// True if code and compression are those of descry's chunks.
+    /// True if opcode and compression are those of descry's chunks.
     is_chunk: bool,
 }
 
-/// Bytes of a chunk before its data.
+/// Number of bytes of a chunk before its data.
 const HEAD: u64 = RECORD_HEAD + CHUNK_HEAD;
 
 impl Head {
@@ -126,7 +126,8 @@ impl Head {
         }
     }
 
-    /// Size given by at least two of the three fields: one damaged field is outvoted.
+    /// Size that at least two of the three fields agree on, bytes, so that one damaged field does not matter;
+    /// else `None`.
     fn agreed(&self) -> Option<u64> {
         let [a, b, c] = self.sizes;
         let size = if a == b || a == c {
@@ -147,8 +148,8 @@ impl Head {
     }
 }
 
-/// Reads a segment chunk by chunk and passes each undamaged record to `take`. Behind `acknowledged`, if
-/// known, no write was ever completed.
+/// Reads a segment chunk by chunk and passes the undamaged records of each to `take`. `acknowledged`, if
+/// known, is the offset up to which writes were completed.
 ///
 /// # Errors
 /// If the file cannot be opened, or `take` fails. Damage is reported in the scan instead.
@@ -217,7 +218,7 @@ impl Scan {
         chunk.records
     }
 
-    /// The fault for unreadable bytes between two chunks, with the missing record numbers.
+    /// Fault for unreadable bytes between two chunks, with the missing record numbers.
     fn gap(&self, bytes: &Bytes, from: u64, to: u64, (at, what): &Fault) -> Fault {
         let first = match step(bytes, to) {
             Ok(Some(chunk)) => chunk.records.first().map(|(document, _)| document.id.0),
@@ -236,7 +237,7 @@ impl Scan {
         )
     }
 
-    /// Classifies the bytes behind the last complete chunk: an unfinished write, or damage.
+    /// Classifies the bytes behind the last complete chunk as an unfinished write or as damage.
     fn stop(&mut self, bytes: &Bytes, at: u64, (place, what): Fault, acknowledged: Option<u64>) {
         if acknowledged.is_some_and(|end| at >= end) || is_unfinished(bytes, at) {
             self.torn = Some((place, what));
@@ -286,8 +287,8 @@ fn summary(bytes: &Bytes, at: u64) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Next offset at which reading can resume behind damage: a valid chunk, or the end of the data. A
-/// chunk with damaged data but of full length is skipped as a whole, so that no bytes within its
+/// Offset behind damage at which reading can resume: a valid chunk, or the end of the data; `None` if there
+/// is none. A chunk with damaged data but of full length is skipped as a whole, so that no bytes within its
 /// blobs are mistaken for a chunk.
 fn resume(bytes: &Bytes, at: u64) -> Option<u64> {
     let passed = bytes.read(at, HEAD).ok().map(|head| Head::parse(&head)).filter(|head| head.is_chunk);
@@ -312,7 +313,7 @@ fn resume(bytes: &Bytes, at: u64) -> Option<u64> {
     None
 }
 
-/// Record that ends the data section, written without a checksum.
+/// MCAP record that ends the data section, written without a checksum.
 const END_OF_DATA: [u8; 13] = [op::DATA_END, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
 
 /// A valid chunk.
@@ -324,7 +325,7 @@ struct Chunk {
     end: u64,
     /// Faults of the chunk beside its undamaged records.
     faults: Vec<Fault>,
-    /// Truncation of its message index at the end of the file.
+    /// Fault if the message index of the chunk is cut off by the end of the file.
     torn: Option<Fault>,
     unwritten: Vec<u8>,
 }
@@ -345,7 +346,7 @@ fn start(bytes: &Bytes) -> Result<u64, Fault> {
     }
 }
 
-/// Reads the chunk at an offset; none at the end of the data.
+/// Reads the chunk at an offset; `None` at the end of the data.
 fn step(bytes: &Bytes, at: u64) -> Result<Option<Chunk>, Fault> {
     if bytes.read(at, END_OF_DATA.len() as u64).is_ok_and(|found| found == END_OF_DATA) {
         return Ok(None);
@@ -353,7 +354,7 @@ fn step(bytes: &Bytes, at: u64) -> Result<Option<Chunk>, Fault> {
     chunk(bytes, at).map(Some)
 }
 
-/// Reads the chunk at an offset. Damaged fields of its head are outvoted by the others; the checksum decides.
+/// Reads the chunk at an offset. A damaged field of its head is outvoted by the others; the checksum decides.
 fn chunk(bytes: &Bytes, at: u64) -> Result<Chunk, Fault> {
     let code = bytes.read(at, 1)?[0];
     let raw = bytes.read(at, HEAD)?;
@@ -405,7 +406,7 @@ fn chunk(bytes: &Bytes, at: u64) -> Result<Chunk, Fault> {
 
 type RecordParts = (Vec<(Document, Located)>, Channels, Vec<(u16, u64, u64)>);
 
-/// Decodes the records in the data of a chunk: blobs first, then their document.
+/// Decodes the records in the data of a chunk, where the blobs of a record precede its document.
 fn records(data: &[u8], chunk_at: u64) -> Result<RecordParts, Fault> {
     let data_at = chunk_at + RECORD_HEAD + CHUNK_HEAD;
     let mut records = Vec::new();
@@ -459,13 +460,13 @@ fn records(data: &[u8], chunk_at: u64) -> Result<RecordParts, Fault> {
     }
 }
 
-/// Spot of the last `length` bytes before `end` in the data of a chunk.
+/// Location and checksum of the last `length` bytes before `end` in the data of a chunk.
 fn spot(data: &[u8], data_at: u64, end: usize, length: usize) -> Spot {
     let from = end.saturating_sub(length);
     Spot { at: data_at + from as u64, crc32: crc32fast::hash(data.get(from..end).unwrap_or(&[])) }
 }
 
-/// Spots of a document's blobs, whose messages end at these offsets.
+/// Locations and checksums of the blobs of a document, whose messages end at these offsets.
 fn located_blobs(
     data: &[u8],
     data_at: u64,
@@ -480,12 +481,12 @@ fn located_blobs(
     Ok(blobs.map(|(end, info)| spot(data, data_at, *end, info.bytes as usize)).collect())
 }
 
-/// Decodes a message as a document; none for the messages of blobs, which never begin with a brace.
+/// Decodes a message as a document; `None` for messages of blobs, which never begin with a brace.
 fn document(content: &[u8]) -> Option<Document> {
     if content.first() == Some(&b'{') { serde_json::from_slice(content).ok() } else { None }
 }
 
-/// True if a chunk, the end of the data, or the end of the file is at an offset.
+/// True if a chunk, the end of the data, or the end of the file is at this offset.
 fn begins_at(bytes: &Bytes, at: u64) -> bool {
     at == bytes.length
         || bytes.read(at, HEAD).is_ok_and(|head| Head::parse(&head).is_whole())

@@ -46,7 +46,7 @@ pub(crate) struct Encoded<'a> {
     pub blobs: Vec<&'a [u8]>,
 }
 
-/// Location of bytes in the file, with their checksum.
+/// Offset of bytes in the file, with their checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Spot {
     /// Offset in the file.
@@ -54,18 +54,18 @@ pub(crate) struct Spot {
     pub crc32: u32,
 }
 
-/// Location of a record: its document and the bytes of its blobs.
+/// Location of a record in a segment: its document and the bytes of its blobs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Located {
     pub chunk: u64,
     pub document: Spot,
     pub document_bytes: u64,
     pub blobs: Vec<Spot>,
-    /// Total size of its messages in the file, bytes.
+    /// Total size of the record's messages in the file, bytes.
     pub message_bytes: u64,
 }
 
-/// Summary entry of a chunk.
+/// Entry for a chunk in the summary of a segment.
 #[derive(Clone, Debug)]
 pub(crate) struct ChunkEntry {
     pub start_ns: u64,
@@ -74,7 +74,7 @@ pub(crate) struct ChunkEntry {
     pub bytes: u64,
     pub data_bytes: u64,
     pub index_bytes: u64,
-    /// Offset of the message index of each channel.
+    /// Channel number and file offset of each message index of the chunk.
     pub indexes: Vec<(u16, u64)>,
 }
 
@@ -129,7 +129,7 @@ impl Writer<'_> {
 }
 
 impl Channels {
-    /// Number of a topic's channel; the declaration of a new channel is appended to `declare`.
+    /// Number of the channel of a topic; the declaration of a new channel is appended to `declare`.
     fn channel(&mut self, topic: &str, form: Option<Form>, declare: &mut Vec<u8>) -> Result<u16, Error> {
         let key = (topic.to_owned(), form);
         if let Some(id) = self.ids.get(&key) {
@@ -172,12 +172,12 @@ impl Channels {
         Ok(id)
     }
 
-    /// Adds an existing schema of a segment that is being repaired.
+    /// Adds the schema record of a segment that is being repaired.
     pub fn adopt_schema(&mut self, record: &[u8]) {
         self.schemas.push(record.to_vec());
     }
 
-    /// Adds an existing channel of a segment that is being repaired.
+    /// Adds the channel record of a segment that is being repaired.
     pub fn adopt_channel(&mut self, record: &[u8]) {
         self.channels.push(record.to_vec());
     }
@@ -187,12 +187,12 @@ impl Channels {
 #[derive(Default)]
 struct Batch<'a> {
     small: Vec<u8>,
-    /// Blobs, each with its offset in `small` and its checksum.
+    /// Blobs, each with the offset in `small` before which it stands, and its checksum.
     blobs: Vec<(usize, &'a [u8], Hasher)>,
     blob_bytes: u64,
     start_ns: u64,
     end_ns: u64,
-    /// Channel, time and offset of each message.
+    /// Channel, time stamp in nanoseconds and offset of each message.
     messages: Vec<(u16, u64, u64)>,
 }
 
@@ -238,7 +238,7 @@ impl<'a> Batch<'a> {
         Spot { at, crc32 }
     }
 
-    /// The chunk's data in slices, and its checksum, combined from those of the blobs.
+    /// Data of the chunk in slices, and its checksum, combined from those of the blobs.
     fn slices(&self) -> (Vec<&[u8]>, u32) {
         let mut slices = Vec::with_capacity(2 * self.blobs.len() + 1);
         let mut sum = Hasher::new();
@@ -256,7 +256,7 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// Size below which blobs are copied into one buffer, bytes: a system call for each would cost more.
+/// Size below which a blob is copied into one buffer, bytes, since a system call for each would cost more.
 const COPIED_BELOW: usize = 16 << 10;
 
 impl Segment {
@@ -393,7 +393,7 @@ impl Segment {
         Ok(())
     }
 
-    /// Removes the last chunk, whose records could not be indexed.
+    /// Removes the last chunks, from offset `end` on, whose records could not be indexed.
     pub fn take_back(&mut self, end: u64) -> Result<(), Error> {
         self.chunks.retain(|c| c.offset < end);
         self.end = end;
@@ -405,12 +405,13 @@ impl Segment {
         self.file.sync_data().map_err(|e| Error::file("cannot sync", &self.path, e))
     }
 
-    /// True if the segment should be followed by another.
+    /// True if the segment is so long that another should follow.
     pub fn is_long(&self, segment_bytes: u64) -> bool {
         self.end >= segment_bytes || self.chunks.len() >= MAX_CHUNKS
     }
 
-    /// Writes the summary, which viewers use to seek, and syncs. The file is complete then.
+    /// Writes the summary, which viewers use to seek, and syncs; the file is then complete. Returns its
+    /// length, bytes.
     pub fn finish(&mut self) -> Result<u64, Error> {
         let end = self.end;
         let bytes = self.summary();
@@ -479,7 +480,7 @@ impl Segment {
         });
     }
 
-    /// Appends bytes.
+    /// Writes bytes at the end of the valid data.
     pub fn write(&mut self, parts: &[&[u8]]) -> Result<(), Error> {
         let mut slices: Vec<IoSlice> = parts.iter().map(|p| IoSlice::new(p)).collect();
         let mut rest = slices.as_mut_slice();
@@ -498,14 +499,14 @@ impl Segment {
         Ok(())
     }
 
-    /// Truncates the file to its valid end.
+    /// Truncates the file to the end of the valid data.
     fn cut(&self) -> Result<(), Error> {
         self.file.set_len(self.end).map_err(|e| Error::file("cannot shorten", &self.path, e))
     }
 }
 
 impl Channels {
-    /// Sequence number of the next message of a channel.
+    /// Number of the next message of a channel, from 0.
     fn count(&mut self, channel: u16) -> u32 {
         let count = self.messages.entry(channel).or_default();
         *count += 1;
@@ -533,8 +534,8 @@ impl ChunkEntry {
     }
 }
 
-/// The message index of a chunk, and the offset of each channel's part. Messages are channel, time and
-/// offset.
+/// Encodes the message index of a chunk; also returns the offset of each channel's part. `messages` are
+/// channel, time and offset of each message.
 pub(crate) fn message_index(messages: &[(u16, u64, u64)]) -> (Vec<u8>, Vec<(u16, u64)>) {
     let mut by_channel: BTreeMap<u16, Vec<(u64, u64)>> = BTreeMap::new();
     for (channel, stamp_ns, at) in messages {

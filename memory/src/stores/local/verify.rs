@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::stores::{Fault, Report};
 use std::collections::BTreeMap;
 
-/// Verifies the checksums of every segment, and compares its content with the index.
+/// Verifies the checksums of every segment, and compares the content of the segments with the index.
 pub(super) fn verify(store: &LocalStore) -> Result<Report, Error> {
     let mut report = Report::default();
     let faults = |what: Vec<String>| {

@@ -1,4 +1,4 @@
-//! Retention: records are removed oldest first, together with their files.
+//! Retention: the oldest records are removed first, together with the files of their blobs.
 
 use super::{MongoStore, number_of, whole};
 use crate::document::Draft;
@@ -11,8 +11,8 @@ use std::sync::atomic::Ordering;
 const AT_A_TIME: i64 = 64;
 
 impl MongoStore {
-    /// Makes room for drafts. Checks the limits after every sixty-fourth of the allowed bytes, or each time
-    /// without a size limit.
+    /// Makes room for `coming` bytes of drafts. With a size limit, the limits are checked once for every
+    /// sixty-fourth of it that is written, else each time.
     ///
     /// # Errors
     /// [`Error::Bounded`] if pinned records, and those of the same moment, leave too little.
@@ -41,8 +41,8 @@ impl MongoStore {
         if must_fit && over > bound / 64 { refused(self.bytes(doc! {})?) } else { Ok(()) }
     }
 
-    /// Removes records until the limits hold with `coming` more bytes; data up to `now_ns` stays. Returns the
-    /// number of removed records, and the remaining excess in bytes.
+    /// Removes records until the limits hold with `coming` more bytes; data from `now_ns` on stays. Returns
+    /// the number of removed records, and the bytes by which the size limit is still exceeded.
     pub(super) fn keep_within(
         &self,
         retention: &Retention,
@@ -74,7 +74,8 @@ impl MongoStore {
         Ok((gone, over))
     }
 
-    /// The holders of pins with the number and bytes of their records, largest first.
+    /// Names of the holders of pins, with the number and the bytes of the records that each holds, largest
+    /// first.
     fn holders(&self) -> Result<Vec<(String, u64, u64)>, Error> {
         let each = doc! { "$unwind": "$pins" };
         let sum = doc! { "$group": { "_id": "$pins", "records": { "$sum": 1_i64 }, "bytes": { "$sum": "$bytes" } } };
@@ -88,14 +89,15 @@ impl MongoStore {
         Ok(held)
     }
 
-    /// End of the newest record, or its stamp if it has no end, nanoseconds.
+    /// End of the record with the newest stamp, or that stamp if it has no end, nanoseconds; `None` without
+    /// records.
     pub(super) fn newest_ns(&self) -> Result<Option<i64>, Error> {
         let newest = self.records.find_one(self.own()).sort(doc! { "stamp_ns": -1, "_id": -1 });
         let newest = self.said(newest.run())?;
         Ok(newest.and_then(|d| d.get_i64("end_ns").or_else(|_| d.get_i64("stamp_ns")).ok()))
     }
 
-    /// Bytes of documents and blobs of own records that meet a condition.
+    /// Total bytes of documents and blobs of this store's records that meet a condition.
     fn bytes(&self, which: Fields) -> Result<u64, Error> {
         let these = doc! { "$match": { "$and": [self.own(), which] } };
         let sum = doc! { "$group": { "_id": Bson::Null, "bytes": { "$sum": "$bytes" } } };
@@ -105,8 +107,8 @@ impl MongoStore {
         Ok(bytes.max(0) as u64)
     }
 
-    /// Removes some of the oldest unpinned records that end before a time, until `wanted` bytes are freed.
-    /// Returns the number and bytes of removed records.
+    /// Removes up to [`AT_A_TIME`] of the oldest unpinned records that end before a time, until `wanted`
+    /// bytes are freed. Returns the number and bytes of removed records.
     fn remove_oldest(&self, before_ns: i64, wanted: u64) -> Result<(u64, u64), Error> {
         let ended = doc! { "stamp_ns": { "$lt": before_ns }, "end_ns": { "$not": { "$gte": before_ns } } };
         let filter = doc! { "$and": [self.own(), ended, { "pins.0": { "$exists": false } }] };
@@ -137,7 +139,7 @@ impl MongoStore {
         self.remove_marked(these)
     }
 
-    /// Removes half-written and half-removed records of a killed process of this name.
+    /// Removes the half-written and half-removed records that a killed process of this name left.
     pub(super) fn remove_pending(&self) -> Result<(), Error> {
         self.remove_marked(doc! { "pending": self.name.robot.clone() })
     }

@@ -1,8 +1,8 @@
-//! Record numbers in a shared store: each name counts from 1 as if it were alone, so that the records of one
-//! robot, and the references in its documents, do not depend on the others.
+//! Record numbers in a shared store: each robot's name counts from 1 as if it were alone, so that the records
+//! of one robot, and the references in its documents, do not depend on the others.
 //!
-//! The database key stands above the index of the name: `_id = (index << 32) + number`. Without a name the
-//! index is 0.
+//! The database key has the index of the name above the number: `_id = (index << 32) + number`. Without a
+//! name the index is 0.
 
 use super::{MongoStore, number_of};
 use crate::document::RecordId;
@@ -11,13 +11,13 @@ use mongodb::bson::{Document as Fields, doc};
 use mongodb::options::ReturnDocument;
 
 const BITS: u32 = 32;
-/// Key of the document in `names` that counts the names; no robot has it as a name.
+/// Key of the document in `names` that counts the names; no robot's name equals it.
 const ALL: i64 = 0;
 
-/// Scope of a store: the name of a robot.
+/// Name of the robot that a store serves; empty for all robots.
 pub struct Name {
     pub robot: String,
-    /// Index of the name in the store; none before the first record.
+    /// Index of the name in the store; `None` before the first record.
     pub index: Option<i64>,
 }
 
@@ -33,8 +33,8 @@ impl Name {
         ids.iter().map(|id| self.inward(*id)).collect()
     }
 
-    /// Converts a database key to the public record number; records of this name are identified by the number
-    /// alone.
+    /// Converts a database key to the public record number, which for records of this name is without the
+    /// index.
     pub fn outward(&self, number: i64) -> RecordId {
         let own = self.index == Some(number >> BITS);
         RecordId(if own { number & ((1 << BITS) - 1) } else { number }.unsigned_abs())
@@ -42,13 +42,13 @@ impl Name {
 }
 
 impl MongoStore {
-    /// Index of this store's name, if it has one.
+    /// Index of this store's name; `None` if it has none yet.
     pub(super) fn index(&self) -> Result<Option<i64>, Error> {
         let own = self.said(self.names.find_one(doc! { "_id": &self.name.robot }).run())?;
         Ok(own.and_then(|own| own.get_i64("index").ok()))
     }
 
-    /// Index of this store's name; the next free one if it has none yet.
+    /// Index of this store's name; reserves the next free one if the name has none yet.
     pub(super) fn take_index(&self) -> Result<i64, Error> {
         if let Some(index) = self.index()? {
             return Ok(index);
@@ -63,7 +63,7 @@ impl MongoStore {
         self.index()?.map_or_else(|| made.and(Err(self.remote("its names cannot be read"))), Ok)
     }
 
-    /// Allocates `count` consecutive numbers; returns the first.
+    /// Reserves `count` consecutive record numbers; returns the first.
     pub(super) fn numbers(&self, count: usize) -> Result<u64, Error> {
         let last = self.count(doc! { "_id": &self.name.robot }, count as i64)?;
         if last >> BITS != 0 {
@@ -80,7 +80,7 @@ impl MongoStore {
         last.ok_or_else(|| self.remote("the last number of a name is no number"))
     }
 
-    /// Releases numbers that a killed process of this name allocated but did not use in any visible record.
+    /// Releases the numbers that a killed process of this name reserved, but used in no complete record.
     pub(super) fn free_numbers(&self) -> Result<(), Error> {
         let newest = self.records.find_one(self.own()).sort(doc! { "_id": -1 });
         let newest = self.said(newest.run())?.and_then(|fields| number_of(&fields)).unwrap_or(0);
@@ -91,7 +91,8 @@ impl MongoStore {
         self.said(self.names.update_one(doc! { "_id": &self.name.robot }, back).run()).map(|_| ())
     }
 
-    /// Stores the highest number among records that are about to be removed.
+    /// Stores the highest of the numbers of records that are about to be removed, so that it is not used
+    /// again.
     pub(super) fn remember_numbers(&self, numbers: &[i64]) -> Result<(), Error> {
         let newest = numbers.iter().max().copied().unwrap_or(0);
         let keep = doc! { "$max": { "pruned": newest } };

@@ -4,8 +4,8 @@ use super::number::Name;
 use crate::document::{Document, Near, Order, Query};
 use mongodb::bson::{Document as Fields, doc};
 
-/// Filter for the conditions that the server decides, with bounding boxes for places. Pending records are
-/// excluded; `own` gives the robot if the query names none, and all robots if it has no name.
+/// Filter for the conditions that the server decides, with bounding boxes for balls. Pending records are
+/// excluded. If the query names no robot, `own` gives the robot, and all robots match if that has no name.
 pub(super) fn filter(query: &Query, own: &Name) -> Fields {
     let mut all = vec![doc! { "pending": { "$exists": false } }];
     let whose = Some(own.robot.clone()).filter(|robot| !robot.is_empty());
@@ -36,8 +36,8 @@ pub(super) fn filter(query: &Query, own: &Name) -> Fields {
     doc! { "$and": all }
 }
 
-/// Bounding-box condition around a ball: each coordinate of the maximum corner above the lower bound, of the
-/// minimum corner below the upper bound.
+/// Condition that a box meets the bounding box of a ball: each coordinate of its maximum corner (field
+/// `greater`) is above the ball's lower bound, and of its minimum corner (`lesser`) below the upper one.
 fn within<'a>(near: &'a Near, [greater, lesser]: [&'a str; 2]) -> impl Iterator<Item = Fields> + 'a {
     (0..3).map(move |i| {
         let (low, high) = (near.place_m[i] - near.radius_m, near.place_m[i] + near.radius_m);
@@ -46,7 +46,7 @@ fn within<'a>(near: &'a Near, [greater, lesser]: [&'a str; 2]) -> impl Iterator<
     })
 }
 
-/// True if a query has a spatial condition, so that the server's results have to be filtered.
+/// True if a query has a spatial condition, for which the server's results must be filtered again.
 pub(super) fn is_of_places(query: &Query) -> bool {
     query.seen_from.is_some() || query.covers.is_some()
 }

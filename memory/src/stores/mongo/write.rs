@@ -1,4 +1,5 @@
-//! Recording: a document stays pending until its files are stored, so that no partial record is ever found.
+//! Recording of documents, which stay pending until the files of their blobs are stored, so that no partial
+//! record is ever found.
 
 use super::{MongoStore, number_of};
 use crate::document::{Document, Draft, RecordId};
@@ -9,14 +10,14 @@ use mongodb::bson::{self, Document as Fields, doc, oid::ObjectId};
 use std::collections::BTreeSet;
 use std::io::Write;
 
-/// A record to be written: its fields, and the files of its blobs.
+/// A record to be written: its fields, and the file IDs of its blobs.
 struct Row {
     fields: Fields,
     files: Vec<ObjectId>,
 }
 
 impl MongoStore {
-    /// Makes room and records a batch. A batch that cannot be recorded completely is removed again.
+    /// Makes room and records a batch of drafts. A batch that cannot be recorded completely is removed again.
     pub(super) fn record(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
         if drafts.is_empty() {
             return Ok(Vec::new());
@@ -98,8 +99,8 @@ impl MongoStore {
         Ok(())
     }
 
-    /// Pins records, in addition to the pins of `by` or instead of them, and records that in a document. An
-    /// interruption leaves too many pins rather than too few.
+    /// Pins records on behalf of `by`, in place of the former pins of `by` if `instead`, and records the
+    /// change in a document. An interruption leaves too many pins rather than too few.
     pub(super) fn pin_records(&self, ids: &[RecordId], by: &str, instead: bool) -> Result<(), Error> {
         self.check_there(ids)?;
         let now_ns = self.newest_ns()?.unwrap_or(0).max(0);
@@ -128,7 +129,7 @@ impl MongoStore {
         self.said(self.records.update_many(these, doc! { "$addToSet": { "pins": by } }).run()).map(|_| ())
     }
 
-    /// Removes all pins of `by`, and records that in a document.
+    /// Removes all pins of `by`, and records the change in a document.
     pub(super) fn unpin_records(&self, by: &str) -> Result<(), Error> {
         let now_ns = self.newest_ns()?.unwrap_or(0).max(0);
         self.record(&[pins::unpinned(now_ns, by)])?;
@@ -142,7 +143,7 @@ impl MongoStore {
     }
 }
 
-/// The stored fields of a document.
+/// Converts a document to the fields that are stored.
 fn fields(document: &Document) -> Result<Fields, Error> {
     let mut fields = bson::serialize_to_document(document).map_err(|e| Error::Input {
         what: format!("what is to be recorded is no document of MongoDB: {e}"),

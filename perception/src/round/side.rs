@@ -188,6 +188,7 @@ impl Seen {
         /// Distance from the axis below which the direction away from it is undefined, metres.
         /// From: rounding.
         const AT_AXIS_M: f32 = 1e-9;
+        /// [`OUTSIDE_M`] in single precision, metres. From: derived, the same.
         const FARTHEST_M: f32 = OUTSIDE_M as f32;
         let (dx, dy) = (lanes(|i| x[i] - self.x), lanes(|i| y[i] - self.y));
         let d = lanes(|i| (dx[i] * dx[i] + dy[i] * dy[i]).sqrt());

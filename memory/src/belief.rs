@@ -26,7 +26,7 @@ pub struct Track {
     pub on: String,
     /// Centre of the object's footprint, world frame, metres.
     pub position_m: Point3<f64>,
-    /// Standard deviation of each coordinate, metres.
+    /// Standard deviation of each coordinate of the position, metres.
     pub position_sigma_m: f64,
     /// Longer and shorter side of the footprint, and height, metres.
     pub size_m: [f64; 3],
@@ -38,7 +38,7 @@ pub struct Track {
     pub probabilities: Vec<(String, f64)>,
     /// Probability of being of each kind, by name.
     pub kinds: Vec<(String, f64)>,
-    /// Probability of being none of the known objects.
+    /// Probability that the object is none of the known ones.
     pub unknown: f64,
     /// Probability of each basic colour, by name; empty if the colour was not seen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

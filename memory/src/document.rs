@@ -58,7 +58,7 @@ pub struct Meta {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
-    /// Points, packed as [`BlobInfo::layout`] says (`foxglove.PointCloud`).
+    /// Points, in the byte layout that [`BlobInfo::layout`] describes (`foxglove.PointCloud`).
     PointCloud,
     /// A sweep of a laser in a plane (`foxglove.LaserScan`).
     LaserScan,
@@ -66,7 +66,7 @@ pub enum Form {
     CompressedImage,
     /// Plain pixels (`foxglove.RawImage`).
     RawImage,
-    /// Transforms of one child frame (`foxglove.FrameTransforms`).
+    /// Transforms from one child frame to its parent (`foxglove.FrameTransforms`).
     FrameTransforms,
     /// One line of the log (`foxglove.Log`).
     Log,
@@ -160,9 +160,9 @@ pub struct Draft<'a> {
     pub frame: String,
     /// True if the record is never pruned.
     pub kept: bool,
-    /// Content, and the metadata by which queries find it.
+    /// Content, and the metadata by which queries find the record.
     pub meta: Meta,
-    /// Blobs, each with a name of its own.
+    /// Blobs of the record, whose names differ.
     pub blobs: Vec<Blob<'a>>,
 }
 
@@ -180,7 +180,7 @@ impl Draft<'_> {
         }
     }
 
-    /// End of the time span, or the stamp of a record without one.
+    /// End of the time span, or the stamp of a record without a time span, nanoseconds.
     pub(crate) fn until_ns(&self) -> i64 {
         self.end_ns.unwrap_or(self.stamp_ns)
     }
@@ -294,7 +294,7 @@ pub struct Query {
     pub covers: Option<Near>,
     /// Name of an object that the records mention.
     pub object: Option<String>,
-    /// Minimum confidence in that object, or in any object if none is given.
+    /// Minimum confidence in `object`, or in any object if none is given.
     pub min_confidence: Option<f64>,
     /// Order of the results.
     pub order: Order,

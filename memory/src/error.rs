@@ -15,8 +15,8 @@ pub enum Error {
         /// File that was being written.
         place: PathBuf,
     },
-    /// The data exceeds the size limit of the record, and too little can be pruned. Nothing of it
-    /// was recorded.
+    /// The data exceeds the size limit of the record, and too little can be pruned. None of the data was
+    /// recorded.
     #[error(
         "{place} is bounded to {}, and {} more do not fit: {} are pinned{} or of this very moment; allow {} or more (`--max-bytes`), or pin less",
         megabytes(*bound), megabytes(*coming), megabytes(*staying), held_text(held), megabytes(staying + coming)
@@ -51,7 +51,7 @@ pub enum Error {
         /// Expected contents of a record's folder.
         expected: &'static str,
     },
-    /// A record exists where a new one was to be made.
+    /// A record exists in the folder for a new one.
     #[error("{place} holds a record already: open it, or name another folder")]
     Exists {
         /// The folder.
@@ -65,7 +65,7 @@ pub enum Error {
         /// The folder.
         place: PathBuf,
     },
-    /// Bytes on the disk differ from those written.
+    /// Bytes on the disk differ from the bytes that were written.
     #[error("{place}, byte {at}: {what}; `descry memory verify` lists what is whole")]
     Damaged {
         /// The file.
@@ -144,7 +144,7 @@ pub enum Error {
     /// The transform tree has no answer for the requested time.
     #[error(transparent)]
     Transform(#[from] crate::transforms::TransformError),
-    /// An earlier background write failed; its data was not acknowledged.
+    /// An earlier write in the background failed; its data was not acknowledged.
     #[error("an earlier write of transforms failed: {because}")]
     Earlier {
         /// Message of that failure.

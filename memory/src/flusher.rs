@@ -149,7 +149,8 @@ fn run(queue: &Receiver<Job>, store: &dyn Store, failed: &Mutex<Failed>) {
     }
 }
 
-/// Writes the failed batches and these groups, as one batch.
+/// Writes the groups of failed writes and the new groups as one batch; on a failure, all are kept for a
+/// retry.
 fn write(store: &dyn Store, failed: &Mutex<Failed>, groups: Vec<Group>) {
     let mut failed = lock(failed);
     failed.groups.extend(groups);

@@ -1,8 +1,8 @@
 //! Messages known to robotics viewers (schemas of the `foxglove` package), in the wire format of protocol
 //! buffers.
 //!
-//! Fields may stand in any order on that wire. The bytes of a blob are always written last, so that what stands before
-//! them follows from the document alone and the bytes themselves lie in the file as one piece.
+//! Fields may be encoded in any order. The bytes of a blob are always encoded last, so that the part before
+//! them follows from the document alone, and the bytes are one piece of the file.
 
 #[doc(hidden)]
 pub mod descriptor;

@@ -31,7 +31,7 @@ pub struct LearnedThing {
     /// Surface points relative to the object's centre, upright as the object stood, metres.
     #[serde(with = "packed")]
     pub cloud: Cloud,
-    /// Share of the directions around the object from which it was seen, 0 to 1.
+    /// Share of the directions around the object from which views showed it, 0 to 1.
     pub sides: f64,
     /// Directions from which the object was seen, as a set of 36 bits: sectors counted anticlockwise from the
     /// object's x axis.

@@ -24,7 +24,7 @@ pub mod kind {
     pub const SCAN: &str = "scan";
     /// An image.
     pub const IMAGE: &str = "image";
-    /// Transforms of one child frame over some time.
+    /// Transforms from one child frame to its parent over a time span.
     pub const TRANSFORMS: &str = "transforms";
     /// A static transform.
     pub const STATIC_TRANSFORM: &str = "static_transform";
@@ -111,7 +111,7 @@ pub struct Record {
     recovery: Recovery,
     options: Options,
     groups: Mutex<Groups>,
-    /// Drafts to be written together with the next one.
+    /// Drafts that are to be written together with the next record.
     soon: Mutex<Vec<Draft<'static>>>,
     flusher: Flusher,
     retrace: Option<Retrace>,
@@ -222,7 +222,7 @@ impl Record {
     }
 
     /// Enqueues a draft to be written with the next record, so that many small drafts share one wait for the
-    /// disk. It is acknowledged with that record, or by [`Record::sync`].
+    /// disk. The draft is acknowledged with that record, or by [`Record::sync`].
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -260,7 +260,7 @@ impl Record {
         self.is_at_bound.load(Ordering::Relaxed)
     }
 
-    /// Records several drafts, all or none.
+    /// Records several drafts; if one fails, none is recorded.
     ///
     /// # Errors
     /// As [`Store::append`].
@@ -286,7 +286,7 @@ impl Record {
         self.store.find(query)
     }
 
-    /// Documents that match a query and are undamaged, blobs included, and the faults of the others.
+    /// Undamaged documents that match a query, with undamaged blobs, and the faults of the damaged ones.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -311,7 +311,7 @@ impl Record {
     /// Document of a kind by this robot that is nearest in time, within a tolerance in nanoseconds.
     ///
     /// # Errors
-    /// [`Error::NotNear`] with the nearest there is.
+    /// [`Error::NotNear`] with the stamp of the nearest document.
     pub fn nearest(&self, kind: &str, stamp_ns: i64, tolerance_ns: i64) -> Result<Document, Error> {
         self.nearest_of(&self.own(kind), stamp_ns, tolerance_ns)
     }
@@ -319,7 +319,7 @@ impl Record {
     /// Document nearest in time among those that match a query, within a tolerance in nanoseconds.
     ///
     /// # Errors
-    /// [`Error::NotNear`] with the nearest there is.
+    /// [`Error::NotNear`] with the stamp of the nearest document.
     pub fn nearest_of(&self, query: &Query, stamp_ns: i64, tolerance_ns: i64) -> Result<Document, Error> {
         let nearest = self.store.nearest(query, stamp_ns)?;
         let nearest_ns = nearest.as_ref().map(|d| d.stamp_ns);
@@ -339,7 +339,7 @@ impl Record {
         self.store.pin(&self.with_their_place(ids)?, by)
     }
 
-    /// Replaces the pins of `by` by these records, pinned as by [`Record::pin`].
+    /// Replaces the pins of `by` by pins on these records, as by [`Record::pin`].
     ///
     /// # Errors
     /// [`Error::Missing`] if a record does not exist; then the former pins stay.

@@ -39,7 +39,7 @@ impl Retrace {
         self.next_like(store, &draft.kind, same)
     }
 
-    /// True if the next recorded pins equal these.
+    /// True if the next recorded document of pins is the one that pins these records on behalf of `by`.
     pub fn next_pins(&self, store: &dyn Store, ids: &[RecordId], by: &str) -> Result<bool, Error> {
         let wanted = pinned(0, ids, by, true).meta.body;
         Ok(self.next_like(store, PIN, |found| Ok(found.body == wanted))?.is_some())

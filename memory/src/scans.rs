@@ -30,7 +30,7 @@ impl Layout {
 /// Encodes a sweep as a blob, without its pose.
 ///
 /// # Errors
-/// [`Error::Input`] if it is inconsistent, or its angles are not evenly spaced.
+/// [`Error::Input`] if the sweep is inconsistent, or its angles are not evenly spaced.
 pub fn encode(scan: &Scan) -> Result<Blob<'static>, Error> {
     let fail = |what: String| Error::Input { what, mend: "give one range an angle, at even steps".into() };
     scan.check().map_err(|e| fail(e.to_string()))?;

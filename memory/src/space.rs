@@ -30,9 +30,9 @@ const SURE: i8 = 12;
 pub enum Cell {
     /// Not observed by any view.
     Unseen,
-    /// A camera looked through it.
+    /// A camera looked through the voxel.
     Free,
-    /// A surface was measured there.
+    /// A surface was measured in the voxel.
     Occupied,
 }
 
@@ -117,7 +117,7 @@ struct Block {
 impl Block {
     const UNSEEN: Self = Self { levels: [UNSEEN; BLOCK], occupied_bricks: 0 };
 
-    /// Updates the set of bricks with an occupied voxel; required after any change of levels.
+    /// Recomputes the set of bricks with an occupied voxel; required after any change of the block's voxels.
     fn find_bricks(&mut self) {
         let mut bricks = 0;
         for (row, levels) in self.levels.chunks_exact(BRICK as usize).enumerate() {

@@ -110,7 +110,7 @@ impl Report {
     }
 }
 
-/// Receiver of a record with the bytes of its blobs.
+/// Function that receives the document of a record, and the bytes of its blobs.
 pub type Take<'a> = dyn FnMut(Document, Vec<Vec<u8>>) -> Result<(), Error> + 'a;
 
 /// Iteration over the results of a query in pages.
@@ -144,7 +144,7 @@ impl Pages {
 ///
 /// Data for which [`Store::append`] has returned is on the disk as far as the store's durability promises.
 pub trait Store: Send + Sync {
-    /// Records all drafts or, on an error, none.
+    /// Records all drafts or, on an error, none of them; returns the numbers of the records.
     ///
     /// # Errors
     /// [`Error::Full`] without room, [`Error::Input`] for what cannot be recorded.
@@ -162,14 +162,14 @@ pub trait Store: Send + Sync {
     /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
     fn blob(&self, id: RecordId, name: &str) -> Result<Vec<u8>, Error>;
 
-    /// Documents that match a query, in its order.
+    /// Documents that match a query, in the query's order.
     ///
     /// # Errors
-    /// [`Error::Damaged`] if any of them is damaged; if the store cannot be read.
+    /// [`Error::Damaged`] if one of the documents is damaged; other errors if the store cannot be read.
     fn find(&self, query: &Query) -> Result<Vec<Document>, Error>;
 
-    /// Passes the undamaged results of a query to `take` in order, with the bytes of their blobs; returns the
-    /// faults of the others.
+    /// Passes the undamaged results of a query to `take` in the query's order, with the bytes of their blobs;
+    /// returns the faults of the damaged results.
     ///
     /// # Errors
     /// If the store cannot be read, or what `take` returns.
@@ -207,7 +207,7 @@ pub trait Store: Send + Sync {
     /// Pins records on behalf of `by`, so that they are never pruned. Durable on return.
     ///
     /// # Errors
-    /// [`Error::Missing`] if one does not exist; then none is pinned.
+    /// [`Error::Missing`] if a record does not exist; then none is pinned.
     fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
     /// Replaces the pins of `by` by pins on these records. At no moment is a record unpinned that is pinned

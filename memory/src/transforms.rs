@@ -182,7 +182,8 @@ pub struct Transforms {
 }
 
 impl Transforms {
-    /// Inserts a measurement; a second one of the same link and stamp replaces the first.
+    /// Inserts a measured transform; a second one between the same frames at the same time replaces the
+    /// first.
     ///
     /// # Errors
     /// [`TransformError::Invalid`] for numbers that are not finite, an invalid rotation, or a frame that is
@@ -199,7 +200,7 @@ impl Transforms {
         Ok(())
     }
 
-    /// Inserts a static transform, valid whenever no measured one is.
+    /// Inserts a static transform, which holds at all times without a measured one.
     ///
     /// # Errors
     /// As [`Transforms::insert`].
@@ -221,7 +222,7 @@ impl Transforms {
         self.links.entry(child.into()).or_default().entry(parent.into()).or_default()
     }
 
-    /// True if there is no transform.
+    /// True if no transform was inserted.
     pub fn is_empty(&self) -> bool {
         self.links.is_empty()
     }

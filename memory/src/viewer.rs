@@ -9,7 +9,7 @@ use descry_perception::{Cloud, Intrinsics};
 use nalgebra::{Isometry3, Vector3};
 use serde_json::Value;
 
-/// A box with a label.
+/// A labelled box around an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labelled {
     /// Identifier of the object, the same in every set of boxes.

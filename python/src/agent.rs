@@ -1,4 +1,4 @@
-//! The agent: pursues a goal in words with a body.
+//! The agent, which pursues a goal given in words with a body.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -164,7 +164,7 @@ pub fn carried_out<T: Send>(
     }
 }
 
-/// Carries out a run on a thread of its own, while this one checks for Ctrl-C and delivers events.
+/// Carries out a run on a thread of its own, while the calling thread checks for Ctrl-C and delivers events.
 fn watched<T: Send>(
     run: impl FnOnce(&Stop, &mut dyn FnMut(&Event)) -> Result<T, CommandError> + Send,
     stop: &Stop,
@@ -214,7 +214,7 @@ pub fn goals(py: Python<'_>, domain: &str) -> PyResult<Vec<String>> {
     Ok(domain.config.goal.iter().map(|goal| goal.say.clone()).collect())
 }
 
-/// Writes a small working domain into a folder, as a starting point.
+/// Writes a small working domain into a folder, as a starting point; returns the paths of the files.
 #[pyfunction]
 pub fn new_domain(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
     write_domain(&folder).map_err(|error| failure::command(py, &error))

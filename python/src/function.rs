@@ -16,9 +16,10 @@ use crate::failure;
 /// Exceptions raised by Python functions during a run.
 #[derive(Default)]
 pub struct Raised {
-    /// The exception that ends the run, such as `KeyboardInterrupt`; ordinary failures of a function do not.
+    /// The exception that ends the run, such as `KeyboardInterrupt`, if there is one; ordinary failures of a
+    /// function do not end it.
     ends: Mutex<Option<PyErr>>,
-    /// The last ordinary failure of a function, with its message.
+    /// The last exception of a function that does not end the run, with its message.
     failed: Mutex<Option<(String, PyErr)>>,
 }
 

@@ -203,10 +203,11 @@ fn models(py: Python<'_>, folder: Option<PathBuf>) -> PyResult<Vec<ObjectModel>>
     loaded.map_err(|error| failure::input(py, &error.to_string()))
 }
 
-/// The points of a file, and the position of its sensor.
+/// Points of a file, metres, and the position of the sensor.
 type Loaded<'py> = (Bound<'py, PyArrayDyn<f32>>, Bound<'py, PyArray1<f64>>);
 
-/// Reads a cloud file (PCD, PLY, NPY, LAS, XYZ, CSV, PTS): its points, and the position of its sensor.
+/// Reads a point cloud file (PCD, PLY, NPY, LAS, XYZ, CSV, PTS); returns the points and the position of the
+/// sensor, metres.
 #[pyfunction]
 pub fn read_cloud<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Loaded<'py>> {
     let shown = path.display();

@@ -37,7 +37,7 @@ impl Watch {
         self.started.elapsed().as_secs_f64()
     }
 
-    /// True if the work is to end now. Cheap; call often, from any thread that does not hold the
+    /// True if the work must end now. Quick enough to be called often, from any thread that does not hold the
     /// interpreter's lock.
     pub fn is_over(&self) -> bool {
         if self.over.load(Ordering::Relaxed) {

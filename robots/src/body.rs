@@ -274,7 +274,7 @@ pub struct Progress {
     pub distance_m: f64,
 }
 
-/// Supervision of a long request: cancellation, time limit, progress reports.
+/// Supervision of a long request: cancellation, time limit, receiver of progress reports.
 #[derive(Clone)]
 pub struct Watch<'a> {
     /// Cancels the request as soon as possible, with [`Failure::Cancelled`].
@@ -320,7 +320,7 @@ pub trait Robot: Send + Sync {
     /// Surfaces in the map.
     fn surfaces(&self) -> &[SurfaceHint];
 
-    /// The only poses where the body can stand; `None` if it can stand anywhere.
+    /// Stations, the only poses where the body can stand; `None` if it can stand anywhere.
     fn stations(&self) -> Option<&[Station]>;
 
     /// Rooms in the map.
@@ -337,12 +337,12 @@ pub trait Robot: Send + Sync {
     /// doors count as open except those named in `shut`.
     ///
     /// # Errors
-    /// Separately for each entry: [`Failure::Unreachable`] with the reason.
+    /// For each destination on its own: [`Failure::Unreachable`] with the reason.
     fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>>;
 
-    /// Predicts the camera's pose (`map_from_camera`) with the base at `place` and the head turned
-    /// towards `look_at` (straight ahead if `None`), within the head's limits. A body without a
-    /// head looks in the direction of its base.
+    /// Predicts the pose of the camera in the map with the base at `place` and the head turned towards
+    /// `look_at` (straight ahead if `None`), within the head's limits. The camera of a body without a head
+    /// turns with its base.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] for an unknown station, or a pose where only
@@ -397,11 +397,11 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Laser))
     }
 
-    /// Reads one of [`Description::senses`] by name.
+    /// Reads the custom sensor of this name, one of [`Description::senses`].
     ///
     /// # Errors
-    /// [`Failure::Unable`] if there is none of that name; [`Failure::SensorDropped`], [`Failure::TimedOut`],
-    /// [`Failure::Cancelled`], [`Failure::Broken`].
+    /// [`Failure::Unable`] if there is no sensor of this name; [`Failure::SensorDropped`],
+    /// [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn read(&self, sense: &str, watch: &Watch<'_>) -> Result<Reading, Failure> {
         let _ = watch;
         Err(self.description().lacks_sense(sense))
@@ -410,8 +410,8 @@ pub trait Robot: Send + Sync {
     /// Pushes an object aside.
     ///
     /// # Errors
-    /// [`Failure::Unable`] without [`Description::arm`]; [`Failure::Unreachable`] if it is out of the arm's reach;
-    /// [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    /// [`Failure::Unable`] without [`Description::arm`]; [`Failure::Unreachable`] if the object is out of the
+    /// arm's reach; [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
         let _ = (push, watch);
         Err(self.description().lacks(Part::Arm))
@@ -420,8 +420,8 @@ pub trait Robot: Send + Sync {
     /// Opens a nearby door from the current pose of the base.
     ///
     /// # Errors
-    /// [`Failure::Unable`] if it cannot open doors; [`Failure::Unreachable`] if no door of that name is in reach;
-    /// [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    /// [`Failure::Unable`] if the body cannot open doors; [`Failure::Unreachable`] if no door of that name is
+    /// in reach; [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
         let _ = (door, watch);
         Err(Failure::Unable { because: format!("{} does not open doors", self.description().name) })
@@ -430,9 +430,10 @@ pub trait Robot: Send + Sync {
     /// Grasps an object and lifts it.
     ///
     /// # Errors
-    /// [`Failure::Unable`] without [`Arm::hand`](crate::Arm::hand), if the hand is full, or if the object is too wide;
-    /// [`Failure::Unreachable`] if it is out of reach; [`Failure::Slipped`] if the hand closes on nothing or loses it;
-    /// [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    /// [`Failure::Unable`] without [`Arm::hand`](crate::Arm::hand), if the hand is full, or if the object is
+    /// too wide; [`Failure::Unreachable`] if the object is out of reach; [`Failure::Slipped`] if the hand
+    /// closes on nothing or loses the object; [`Failure::TimedOut`], [`Failure::Cancelled`],
+    /// [`Failure::Broken`].
     async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
         let _ = (grasp, watch);
         Err(self.description().lacks(Part::Hand))

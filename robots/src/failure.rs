@@ -1,4 +1,4 @@
-//! Failures of a body. Each kind updates the belief differently.
+//! Failures of a body. What the agent believes afterwards depends on the kind.
 
 use crate::body::Stamp;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ pub enum Failure {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         by: Option<String>,
     },
-    /// The time limit passed. The body stands still at its current place.
+    /// The time limit passed. The body stands still where it is.
     #[error("timed out: {because}")]
     TimedOut {
         /// Request and elapsed time.
@@ -87,7 +87,7 @@ impl Failure {
         }
     }
 
-    /// One word for records and counts: `unreachable`, `blocked`, `timed_out`, …
+    /// Kind of the failure in one word, for records and counts: `unreachable`, `blocked`, `timed_out`, …
     pub fn kind(&self) -> &'static str {
         match self {
             Failure::Unreachable { .. } => "unreachable",

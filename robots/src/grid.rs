@@ -27,7 +27,7 @@ impl OccupancyGrid {
         OccupancyGrid { resolution_m, origin_m: low, width, height, occupied: vec![false; width * height] }
     }
 
-    /// Column and row of the cell that holds a point; `None` outside.
+    /// Column and row of the cell that holds a point; `None` for a point outside the grid.
     pub fn cell(&self, p: &Point2<f64>) -> Option<(usize, usize)> {
         let column = ((p.x - self.origin_m.x) / self.resolution_m).floor();
         let row = ((p.y - self.origin_m.y) / self.resolution_m).floor();

@@ -94,8 +94,8 @@ pub fn clipped(line: &str) -> String {
 /// Maximum size, bytes, of a text written by a person: a domain, a scene, settings. From: chosen.
 pub const MOST_TEXT_BYTES: u64 = 16 << 20;
 
-/// Reads a file of at most `most` bytes. Named pipes, devices and sockets are refused without waiting for
-/// them.
+/// Reads a file of at most `most` bytes. Named pipes, devices and sockets are refused at once, without
+/// waiting for data.
 ///
 /// # Errors
 /// The system's error, or the reason for the refusal.

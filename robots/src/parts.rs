@@ -13,9 +13,9 @@ pub struct Description {
     pub name: String,
     /// True if the body and its world are simulated.
     pub simulated: bool,
-    /// Base; `None` if the body stays at its only station.
+    /// Mobile base; `None` if the body stays at its only station.
     pub base: Option<Base>,
-    /// Head that turns the camera; `None` if the camera's direction follows the base's pose.
+    /// Head that turns the camera; `None` if only the base turns the camera.
     pub head: Option<Head>,
     /// Arm; `None` if the body has none.
     pub arm: Option<Arm>,
@@ -108,7 +108,7 @@ impl Description {
         self.base.as_ref().map_or(0.0, |base| base.speeds.duration_s(distance_m, turned_rad))
     }
 
-    /// Radius of the base, metres; 0 without one.
+    /// Radius of the base, metres; 0 without a base.
     pub fn radius_m(&self) -> f64 {
         self.base.as_ref().map_or(0.0, |base| base.footprint.radius_m())
     }

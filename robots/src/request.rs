@@ -199,7 +199,7 @@ impl Exposure {
         }
     }
 
-    /// Completes the frame with its pixels.
+    /// Joins the frame with its pixels.
     pub fn with(self, pixels: Pixels) -> Sensed {
         Sensed {
             stamp_ns: self.stamp_ns,

@@ -16,8 +16,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Maximum distance by which a start inside the inflated zone is moved to free floor, metres: localisation
-/// may place a base beside a table within it.
+/// Maximum distance by which a start too close to an obstacle is moved to free floor, metres: by its
+/// estimate, a base may stand closer to a table than is allowed.
 const START_SLACK_M: f64 = 0.35;
 
 /// Relative tolerance by which summed lengths may fall short of the straight line.
@@ -33,15 +33,15 @@ type PoseBits = [u64; 3];
 /// A route with its cost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Route {
-    /// Waypoints from the start to the goal, both included; straight lines between, turns on the spot at
-    /// each.
+    /// Waypoints from start to goal, both included, map frame, metres: straight lines between them, a turn on
+    /// the spot at each.
     pub points_m: Vec<Point2<f64>>,
     /// Cost, including the turns at both ends.
     pub travel: Travel,
 }
 
-/// Route queries on one map for one footprint. Distances between corners, and the corners visible from a
-/// point, are computed once on demand.
+/// Routes on one map for one footprint. Distances between corners, and the corners visible from a point, are
+/// computed once, when they are first needed.
 #[derive(Debug)]
 pub struct Router {
     blocked: OccupancyGrid,
@@ -141,8 +141,8 @@ impl Router {
         self.travel_to_each(from, std::slice::from_ref(to)).swap_remove(0)
     }
 
-    /// Cost of the drives from one pose to each of the others; the lines of sight of the start are
-    /// shared.
+    /// Cost of the drives from one pose to each of the others, in the order of `to`; the lines of sight of
+    /// the start are shared.
     pub fn travel_to_each(&self, from: &Pose2, to: &[Pose2]) -> Vec<Result<Travel, Failure>> {
         let start = self.start_access(from);
         to.iter()
@@ -526,7 +526,7 @@ fn inflate(map: &OccupancyGrid, radius_m: f64) -> OccupancyGrid {
 }
 
 /// Convex corners of the obstacles, where shortest routes bend: centres of the free cells that touch a
-/// blocked one with a corner only.
+/// blocked cell at a corner only.
 fn convex_corners(blocked: &OccupancyGrid) -> Vec<Point2<f64>> {
     let mut corners = Vec::new();
     for row in 0..blocked.height as i64 {

@@ -19,7 +19,7 @@ impl Record {
     /// Records a cloud, in `frame` (a camera's optical frame, for [`Record::view_at`]).
     ///
     /// # Errors
-    /// [`Error::Input`] if its parts do not fit together; [`Error::Full`].
+    /// [`Error::Input`] if the parts of the cloud do not fit together; [`Error::Full`].
     pub fn put_cloud(
         &self,
         stamp_ns: i64,
@@ -37,7 +37,7 @@ impl Record {
     /// Records a laser sweep in `frame`; the transforms of its time give its pose.
     ///
     /// # Errors
-    /// [`Error::Input`] if it is inconsistent, or its angles are not evenly spaced; [`Error::Full`].
+    /// [`Error::Input`] if the sweep is inconsistent, or its angles are not evenly spaced; [`Error::Full`].
     pub fn put_scan(&self, stamp_ns: i64, frame: &str, scan: &Scan, meta: Meta) -> Result<RecordId, Error> {
         let blobs = vec![scans::encode(scan)?];
         self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::SCAN, stamp_ns) })
@@ -46,7 +46,7 @@ impl Record {
     /// Records an image, in `frame`.
     ///
     /// # Errors
-    /// [`Error::Input`] if its pixels do not fit its size; [`Error::Full`].
+    /// [`Error::Input`] if the pixels do not fit the size of the image; [`Error::Full`].
     pub fn put_image(&self, stamp_ns: i64, frame: &str, image: Image, meta: Meta) -> Result<RecordId, Error> {
         self.put(image_draft(stamp_ns, frame, image, meta)?)
     }
@@ -62,8 +62,8 @@ impl Record {
         self.put_soon(Draft { kind, stamp_ns, end_ns, frame, kept, meta, blobs })
     }
 
-    /// Records a transform. Lookups see it at once; it reaches the disk when its group is full or at
-    /// [`Record::sync`].
+    /// Records a transform. Lookups see the transform at once; it reaches the disk when its group is full or
+    /// at [`Record::sync`].
     ///
     /// # Errors
     /// [`transforms::TransformError::Invalid`], or the failure of an earlier group to reach the disk; then
@@ -130,7 +130,7 @@ impl Record {
         Ok(!self.is_measured(parent, child, sample)?)
     }
 
-    /// Records a static transform, valid whenever no measured one is.
+    /// Records a static transform, which holds at all times without a measured one.
     ///
     /// # Errors
     /// [`transforms::TransformError::Invalid`], [`Error::Full`].

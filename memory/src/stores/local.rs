@@ -108,7 +108,7 @@ pub struct LocalStore {
 const OPEN_FILES: usize = 64;
 
 impl LocalStore {
-    /// Creates a store in a folder that holds none.
+    /// Creates a store in a folder that holds no store.
     ///
     /// # Errors
     /// [`Error::Exists`], or what the system refuses.

@@ -52,7 +52,7 @@ impl Pose2 {
 pub enum Place {
     /// Any pose on the floor.
     Pose(Pose2),
-    /// One of [`Robot::stations`](crate::Robot::stations), by name.
+    /// Station of this name, one of [`Robot::stations`](crate::Robot::stations).
     Station(String),
 }
 

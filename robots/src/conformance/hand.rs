@@ -1,4 +1,4 @@
-//! Conformance of bodies with a hand, and of those without.
+//! Conformance of the hand; bodies without a hand must say so.
 
 use super::{Breach, done, ensure};
 use crate::body::{CancellationToken, Grasp, Place, Placing, Robot, Watch};

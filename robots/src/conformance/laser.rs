@@ -1,4 +1,4 @@
-//! Conformance of bodies with a laser, and of those without.
+//! Conformance of the laser; bodies without a laser must say so.
 
 use super::{Breach, ROUNDING, done, ensure, gap};
 use crate::body::{CancellationToken, Pose2, Robot, Scanned, Watch};

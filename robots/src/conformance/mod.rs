@@ -1,8 +1,8 @@
 //! Conformance test for any implementation of [`Robot`]: checks the guarantees that every body gives.
 //!
-//! The body is driven, looks, takes frames and sweeps its laser; it needs one reachable place besides its
-//! own, open doors, an empty hand, and no faults. [`check_carrying`] is for bodies with a hand and needs an
-//! object.
+//! The test drives the body, turns its head, takes frames and sweeps its laser; the body needs one reachable
+//! place besides its own, open doors, an empty hand, and no faults. [`check_carrying`] is for bodies with a
+//! hand and needs an object.
 
 mod doors;
 mod hand;

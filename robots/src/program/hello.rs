@@ -1,4 +1,4 @@
-//! First message of a program: description of the body, and its map.
+//! First message of a program, the *hello*: description of the body, and its map.
 
 use crate::body::{Door, Room, Stamp, Station, SurfaceHint};
 use crate::grid::OccupancyGrid;
@@ -43,7 +43,7 @@ pub(super) struct Hello {
     arm: Option<Arm>,
     /// Horizontal laser; left out if there is none.
     laser: Option<Laser>,
-    /// Other sensors.
+    /// Custom sensors.
     #[serde(default)]
     senses: Vec<Sense>,
     /// Names of the map frame and the base frame.
@@ -105,7 +105,7 @@ struct Camera {
     cy: f64,
     /// Minimum and maximum depth, metres.
     range_m: (f64, f64),
-    /// Length of one unit of depth, metres.
+    /// Length of one unit of depth in images, metres.
     #[serde(default = "default_unit_m")]
     unit_m: f64,
     /// True if a colour image of the same pixels follows the depths.

@@ -19,8 +19,8 @@ impl Peer {
         }
     }
 
-    /// True if the process has ended although its output may still be open. A connection reports its end
-    /// itself.
+    /// True if a child process has ended, even if its output is still open; false for a connection, whose end
+    /// shows by itself.
     pub fn has_ended(&self) -> bool {
         match self {
             Self::Started(process) => process.has_ended(),

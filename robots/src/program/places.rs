@@ -168,7 +168,7 @@ fn straight(body: &Description, from: &Isometry3<f64>, to: &Isometry3<f64>) -> T
     Travel { distance_m, duration_s: body.duration_s(distance_m, turned_rad) }
 }
 
-/// Marks a door's opening as occupied, one cell thick to either side.
+/// Marks a door's opening in the map as occupied, one cell deep to either side of the wall's middle.
 fn close(map: &mut OccupancyGrid, door: &Door) {
     let door_from_map = Rotation2::new(-door.along_rad);
     let (half_width_m, half_depth_m) = (0.5 * door.width_m, map.resolution_m);

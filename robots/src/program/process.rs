@@ -1,4 +1,5 @@
-//! Child process of a robot program: restricted at the start, ended with all its children.
+//! Child process that runs a robot program: restricted at the start, and killed at the end with all its own
+//! children.
 
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 use std::collections::VecDeque;
@@ -9,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Environment variables passed to a program; keys, tokens and logins are not among them.
+/// Names of the environment variables passed to a program, which leaves out keys, tokens and logins.
 const ENVIRONMENT: [&str; 12] = [
     "PATH",
     "HOME",
@@ -28,7 +29,7 @@ const ENVIRONMENT: [&str; 12] = [
 const LAST_WORDS: usize = 4096;
 /// Maximum number of last lines of standard error that are shown.
 const SHOWN_LINES: usize = 6;
-/// Time for a program to exit by itself once its input is closed.
+/// Time in which a program may exit by itself once its input is closed.
 const PARTING: Duration = Duration::from_millis(500);
 /// Interval between checks whether the program has ended.
 const GLANCE: Duration = Duration::from_millis(5);
@@ -67,8 +68,8 @@ impl Process {
         self.ends_within(Duration::ZERO)
     }
 
-    /// Waits for the end of the program up to a limit; true if it has ended. It is not reaped, so that its
-    /// process group keeps its number.
+    /// Waits up to `limit` for the end of the program; true if it has ended. The process is not reaped, so
+    /// that its process group keeps its number.
     fn ends_within(&self, limit: Duration) -> bool {
         let Some(pid) = pid(&self.child) else { return true };
         let deadline = Instant::now() + limit;

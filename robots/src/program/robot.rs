@@ -147,7 +147,7 @@ impl ProgramRobot {
         done
     }
 
-    /// Passes on a valid answer; an invalid one ends the program.
+    /// Passes on a valid answer; an invalid one ends the program, and every later request fails.
     async fn hold<T>(&self, checked: Result<T, String>) -> Result<T, Failure> {
         match checked {
             Ok(answer) => Ok(answer),

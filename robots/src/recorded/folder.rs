@@ -288,7 +288,7 @@ fn listed(folder: &Path) -> Result<Vec<Candidate>, InputError> {
     Ok(files.into_iter().zip(poses).map(candidate).collect())
 }
 
-/// Name of a file without its extension.
+/// Name of a file without its extension; the whole name if it has none.
 pub(crate) fn stem(file: &str) -> &str {
     Path::new(file).file_stem().and_then(OsStr::to_str).unwrap_or(file)
 }

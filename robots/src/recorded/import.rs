@@ -26,7 +26,8 @@ const LEVER_M: f64 = 0.6;
 /// Maximum angle between the stated up and the mean upward direction of the images, radians; beyond it the
 /// stated up is dropped. From: chosen, that of perception.
 const HELD_RAD: f64 = 1.2;
-/// Distance of the first pose from the origin beyond which positions are recentred, metres: single precision blurs farther ones. From: chosen.
+/// Distance of the first pose from the origin, metres, beyond which all positions are recentred, since single
+/// precision blurs large coordinates. From: chosen.
 const FARTHEST_M: f64 = 100.0;
 /// Units in a metre of depth images that are converted from floating point: steps of half a millimetre, up to
 /// 32 m.

@@ -50,7 +50,7 @@ pub(crate) fn check(corners: &[Point2<f64>], widest_m: f64) -> Result<(), Fault>
 /// Checks the height of a surface, metres.
 ///
 /// # Errors
-/// If it is not finite or implausible.
+/// If the height is not finite or implausible.
 pub(crate) fn check_height(height_m: f64) -> Result<(), Fault> {
     if height_m.is_finite() && height_m.abs() <= HIGHEST_M {
         return Ok(());

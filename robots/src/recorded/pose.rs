@@ -4,7 +4,7 @@ use crate::input::InputError;
 use crate::recorded::settings::CameraSettings;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Tolerance on the entries of a rotation matrix, as they may be written with few digits.
+/// Tolerance on the entries of a rotation matrix, since files may give few digits.
 const ROTATION_TOLERANCE: f64 = 0.03;
 
 /// Tolerance on the fixed entries of a camera matrix.

@@ -79,7 +79,7 @@ impl Axes {
         }
     }
 
-    /// Rotation from the optical frame into these axes.
+    /// Rotation from the optical frame into the camera frame with these axes.
     fn rotation_from_optical(self) -> UnitQuaternion<f64> {
         let rows = match self {
             Axes::Optical => return UnitQuaternion::identity(),

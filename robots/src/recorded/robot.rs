@@ -23,7 +23,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Time that taking a frame costs on the body's clock, seconds.
 const FRAME_S: f64 = 0.1;
 
-/// A recording as a robot. Its base is the camera; it stands at one of its frames and has no map.
+/// A recording as a robot. The camera frame serves as the base frame; the robot stands at one of the recorded
+/// frames and has no map.
 pub struct RecordedRobot {
     frames: Box<dyn Footage>,
     description: Description,

@@ -49,7 +49,7 @@ pub struct Settings {
 pub struct SurfaceSettings {
     /// Name for people.
     pub name: String,
-    /// Corners in order around it, along the world's x and y, metres.
+    /// Corners of the surface in order, along the world's x and y, metres.
     pub outline_m: Vec<[f64; 2]>,
     /// Height of the top along the world's z, metres.
     pub height_m: f64,
@@ -92,7 +92,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Parses a `recording.toml`. `file` is its name for messages.
+    /// Parses a `recording.toml`; `file` is the name of the file in messages.
     ///
     /// # Errors
     /// The first fault, with its place in the text and a fix.

@@ -37,7 +37,7 @@ pub struct StatedFrame {
 pub struct Stated {
     /// Frames whose pose is known, in the order of the recording.
     pub frames: Vec<StatedFrame>,
-    /// Images of these frames.
+    /// Images of the frames.
     pub images: Box<dyn Images>,
     /// Units and conventions that the layout defines.
     pub reading: Conventions,
@@ -45,7 +45,7 @@ pub struct Stated {
     pub whole: bool,
     /// True if pixels of colour and depth are the same.
     pub registered: bool,
-    /// Upward direction in the world of the poses, if the layout defines it.
+    /// Upward direction in the world of the poses, if the layout defines one.
     pub up: Option<[f64; 3]>,
     /// Notes for people: what was assumed or left out.
     pub notes: Vec<String>,
@@ -56,13 +56,13 @@ pub trait Images: Send + Sync {
     /// Depth image of a frame.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// If the image cannot be read.
     fn depth(&self, frame: usize) -> Result<RawDepth, InputError>;
 
     /// Colour image of a frame, if there is one.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// If the image cannot be read.
     fn colour(&self, frame: usize) -> Result<Option<RgbImage>, InputError>;
 
     /// Paths of a frame's depth and colour image, if they are files that may be copied as they are.
@@ -74,7 +74,7 @@ pub trait Images: Send + Sync {
     fn coloured(&self) -> bool;
 }
 
-/// Images in files of their own: depth, and colour if there is some.
+/// Paths of the image files of each frame: depth, and colour if there is some.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Files(pub Vec<(PathBuf, Option<PathBuf>)>);
 

@@ -95,7 +95,7 @@ pub trait Tape: Send + Sync {
     /// are stored next.
     ///
     /// # Errors
-    /// The reason for which it cannot be stored.
+    /// The reason for which the entry cannot be stored.
     fn keep(&self, entry: &Entry) -> Result<(), String>;
 
     /// Pixels of a stored frame.

@@ -1,4 +1,5 @@
-//! A body with all answers stored on a tape, which first replays the answers already on it.
+//! A body whose answers are all stored on a tape; the answers that are on the tape already are replayed
+//! first.
 
 use super::tape::{Entry, Known, Question, Reply, Tape};
 use crate::body::{
@@ -14,7 +15,8 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A body on tape. Its clock stands still between two answers, so that repeated queries get the same answer.
+/// A body whose requests and answers are stored on a tape. Its clock stands still between two answers, so
+/// that repeated queries get the same answer.
 ///
 /// | a run | answers on the tape | live body |
 /// |---|---|---|
@@ -105,7 +107,7 @@ impl TapedRobot {
     /// Stores the queries since the last answer, at the end of a run.
     ///
     /// # Errors
-    /// [`Failure::Broken`] if they cannot be stored.
+    /// [`Failure::Broken`] if the queries cannot be stored.
     pub fn finish(&self) -> Result<(), Failure> {
         let entry = {
             let mut state = self.lock();

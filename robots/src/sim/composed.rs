@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Composed {
-    /// The solids; where they overlap, only the outer surface is visible.
+    /// Solids of the object; where they overlap, only the outer surface is visible.
     pub parts: Vec<Piece>,
 }
 

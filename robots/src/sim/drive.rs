@@ -1,4 +1,4 @@
-//! Motion of the simulated base: along a route in its own estimate, while its true pose deviates.
+//! Motion of the simulated base: its estimated pose follows the route, and its true pose deviates from that.
 
 use crate::body::Pose2;
 use crate::parts::Speeds;
@@ -21,8 +21,8 @@ pub struct DriveStep {
     pub metres: f64,
 }
 
-/// Steps of a route: for each line a turn on the spot, then straight on; finally a turn to the
-/// goal's heading. Their durations add up to that of the route.
+/// Steps of a route: for each line a turn on the spot, then parts of the line; finally a turn to the goal's
+/// heading. Their durations add up to that of the route.
 pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<DriveStep> {
     let mut steps = Vec::new();
     let mut heading_rad = from.yaw_rad;
@@ -91,13 +91,13 @@ impl Localisation {
         )
     }
 
-    /// Draws `estimate_from_truth` at a stop. It is constant while the base stands, so repeated queries do
-    /// not average it out.
+    /// Draws the error of localisation at a stop, as `estimate_from_truth`. The error is constant while the
+    /// base stands, so that repeated queries do not average it out.
     pub fn error(&self, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
         shift(self.sigma_m * normal(rng), self.sigma_m * normal(rng), self.sigma_rad * normal(rng))
     }
 
-    /// Draws `estimate_from_truth` for a failed localisation: 10 cm and 6° in random directions.
+    /// Draws the error of a failed localisation, as `estimate_from_truth`: 10 cm and 6° in random directions.
     pub fn bad_error(rng: &mut ChaCha8Rng) -> Isometry3<f64> {
         let direction: f64 = std::f64::consts::TAU * rand::Rng::random::<f64>(rng);
         let sign = if rand::Rng::random::<bool>(rng) { 1.0 } else { -1.0 };

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
-    /// A person stands in the way: the drive ends early.
+    /// A person stands in the way, and the drive ends early.
     BlockedPath,
     /// The goal of the drive cannot be reached, now or later, although the map shows a route.
     UnreachablePose,
@@ -80,7 +80,7 @@ impl FaultKind {
 pub struct Fault {
     /// Kind of the fault.
     pub kind: FaultKind,
-    /// Number of the drive (or frame, or grasp) at which it happens, from 1.
+    /// Number of the drive (or frame, or grasp) at which the fault happens, from 1.
     #[serde(default)]
     pub at: Option<u64>,
     /// Probability of the fault at each drive (or frame, or grasp), in place of a number.

@@ -12,7 +12,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Probability that a grasped object slips.
 const SLIP_CHANCE: f64 = 0.08;
-/// Maximum horizontal distance of an object's centre from the stated point for the hand to find it, metres.
+/// Maximum horizontal distance between the stated point and the centre of an object that the hand finds
+/// there, metres.
 const FIND_M: f64 = 0.12;
 /// Tolerance of the hand above and below the object, metres.
 const FIND_HEIGHT_M: f64 = 0.05;
@@ -22,7 +23,8 @@ const SLIDE_M: f64 = 0.05;
 const SLIDE_TRIES: usize = 8;
 /// Standard deviation of a placement along x and y, metres.
 const PLACE_SIGMA_M: f64 = 0.01;
-/// Maximum difference between true and stated height of a surface for the hand to find it, metres.
+/// Maximum difference between the stated height and the true height of a surface that the hand finds there,
+/// metres.
 const SURFACE_HEIGHT_M: f64 = 0.1;
 /// Maximum overhang that is corrected by moving the object inwards, metres.
 const EDGE_M: f64 = 0.05;

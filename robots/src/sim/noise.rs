@@ -10,7 +10,8 @@ use std::sync::OnceLock;
 /// Parameters of a depth camera's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthNoise {
-    /// Distance between projector and camera, metres; points seen by only one of them are lost in shadow.
+    /// Distance between projector and camera, metres; points that the projector does not light are lost in
+    /// shadow.
     pub baseline_m: f64,
     /// Number of disparity steps in one pixel.
     pub disparity_steps: f64,

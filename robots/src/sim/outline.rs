@@ -1,4 +1,4 @@
-//! Outlines of things on the floor plan, and gaps between them.
+//! Outlines of objects seen from above, and gaps between them.
 
 use nalgebra::{Isometry2, Isometry3, Point2, Translation3, UnitQuaternion, Vector2, Vector3};
 

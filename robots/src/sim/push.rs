@@ -15,12 +15,13 @@ const DISTANCE_SIGMA: f64 = 0.08;
 const DIRECTION_SIGMA_RAD: f64 = 0.08;
 /// Standard deviation of the object's rotation, radians.
 const TURN_SIGMA_RAD: f64 = 0.15;
-/// Maximum horizontal distance of an object's centre from the stated point for the hand to find it, metres.
+/// Maximum horizontal distance between the stated point and the centre of an object that the hand finds
+/// there, metres.
 const FIND_M: f64 = 0.15;
 /// Tolerance of the hand above an object's top and below its base, metres, which excludes objects on other
 /// boards.
 const FIND_HEIGHT_M: f64 = 0.05;
-/// Step of a push, metres; obstacles are checked at each.
+/// Step of a push, metres; after each step, obstacles are checked.
 const STEP_M: f64 = 0.005;
 
 /// Effect of a push.

@@ -200,8 +200,8 @@ fn shade(colour: [u8; 3], normal: &Vector3<f64>) -> [u8; 3] {
     colour.map(|c| (f64::from(c) * light).min(255.0) as u8)
 }
 
-/// Visible share of a solid: pixels where it is seen over pixels that it would cover alone, at every
-/// `stride`-th column and row. `None` if it covers no pixel of the image.
+/// Visible share of a solid, 0 to 1: pixels that show it over pixels that would show it without other solids,
+/// at every `stride`-th column and row. `None` if the solid covers no pixel.
 pub fn visible_share(
     scene: &Scene,
     label: u16,

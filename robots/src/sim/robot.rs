@@ -147,8 +147,8 @@ impl SimRobot {
         Truth::of(&state.scene, state.now_ns, &state.map_from_base(), &state.events)
     }
 
-    /// Visible share of an object from a pose with the head turned to it; 0 if it is absent. For the oracle
-    /// of experiments and for reports.
+    /// Visible share of an object, 0 to 1, from a pose of the base with the head turned to the object; 0 if
+    /// it is absent. For the oracle of experiments and for reports.
     pub fn true_visible_share(&self, object: &str, pose: &Pose2) -> f64 {
         let state = self.lock();
         let Some(index) = state.scene.objects.iter().position(|o| o.name == object && o.is_in_place()) else {

@@ -145,7 +145,7 @@ fn default_handle_thickness_m() -> f64 {
 }
 
 impl Shape {
-    /// Height above its base, metres.
+    /// Height of the shape above its base, metres.
     pub fn height_m(&self) -> f64 {
         match self {
             Shape::Cup(Cup { height_m, .. })

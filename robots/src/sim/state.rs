@@ -78,7 +78,7 @@ impl State {
         self.now_ns += (seconds * 1e9).round() as Stamp;
     }
 
-    /// Does one step of a drive.
+    /// Carries out one step of a drive.
     pub fn follow(&mut self, step: &drive::DriveStep) {
         self.pass(step.seconds);
         self.estimate = step.pose;
@@ -128,7 +128,7 @@ impl State {
         self.scene.doors.iter().position(|d| d.doorway.name == name)
     }
 
-    /// Indices of the doors of these names.
+    /// Indices of the doors of these names; fails if the scene lacks one of them.
     pub fn doors(&self, names: &[String]) -> Result<Doors, Failure> {
         let known = |name: &String| {
             let because = || format!("the map has no door \"{name}\"");
@@ -137,7 +137,7 @@ impl State {
         names.iter().map(known).collect()
     }
 
-    /// The route to a goal around the doors known to be shut; up to one of them if there is no other route.
+    /// Route to a goal around the doors known to be shut, or up to one of them if there is no other route.
     pub fn plan(&mut self, goal: &Pose2) -> Result<Route, Failure> {
         let around = self.routes.with_shut(&self.seen_shut).route(&self.estimate, goal);
         match around {
@@ -258,7 +258,7 @@ impl State {
         self.note(format!("\"{name}\" falls out of the hand"));
     }
 
-    /// Lets someone shut a door, unless the base stands in it.
+    /// Lets someone shut a door in which the base does not stand.
     pub fn shut_a_door(&mut self, fault: &Fault, radius_m: f64) {
         let here = self.map_from_base().translation.vector.xy().into();
         let free = |d: &HungDoor| !d.shut && d.doorway.distance_m(&here) > radius_m;

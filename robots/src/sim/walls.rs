@@ -1,4 +1,4 @@
-//! Walls of a flat, derived from its rooms and doors: everything that is neither floor nor opening.
+//! Walls of a flat: everything within its outline that is neither floor of a room nor opening of a door.
 
 use crate::sim::scene::{Doorway, RoomSpec};
 use nalgebra::{Point2, Point3};

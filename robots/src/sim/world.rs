@@ -48,7 +48,7 @@ pub struct Object {
 }
 
 impl Object {
-    /// Centre of its bounding box without a handle, map frame, metres.
+    /// Centre of the object's bounding box without a handle, map frame, metres.
     pub fn centre_m(&self) -> Point3<f64> {
         let middle = match &self.shape {
             Shape::Composed(_) | Shape::Household(_) => {
@@ -196,8 +196,8 @@ impl Solid {
 
 /// Thickness of a table's legs, metres.
 const LEG_M: f64 = 0.05;
-/// Thickness of a shelf's uprights, metres; they stand beside the boards and end below their tops,
-/// so that boards end as mapped.
+/// Thickness of a shelf's side panels, metres. They stand beside the boards and end below the boards' tops,
+/// so that the boards end where the map says.
 const UPRIGHT_M: f64 = 0.02;
 /// Thickness of a door's panel, metres.
 const PANEL_M: f64 = 0.04;

@@ -16,7 +16,7 @@ const CLOSED: &str = "closed.json";
 pub(super) struct Closed {
     /// Sizes and checksums of the index and its write-ahead log.
     index: [Sum; 2],
-    /// Length of each segment, bytes, by number.
+    /// Length of each segment in bytes, by the segment's number.
     pub segments: BTreeMap<u64, u64>,
     /// Number of records.
     pub records: u64,

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// Name of the index file.
 pub(super) const INDEX: &str = "index.sqlite";
-/// Version of the file format; an older index is rebuilt, a newer one is refused.
+/// Version of the index format; an older index is rebuilt, a newer one is refused.
 const FORMAT: i64 = 2;
 
 const TABLES: &str = "
@@ -111,10 +111,10 @@ impl Index {
         Ok(Index { db, dir: dir.to_owned(), names: BTreeMap::new() })
     }
 
-    /// True if the index has the current format. An older one has to be rebuilt.
+    /// True if the index has the current format; an index of an older format has to be rebuilt.
     ///
     /// # Errors
-    /// [`Error::Damaged`] for a newer one, which must not be overwritten.
+    /// [`Error::Damaged`] for an index of a newer format, which must not be overwritten.
     pub fn is_current(&self) -> Result<bool, Error> {
         let format: i64 =
             self.db.query_row("PRAGMA user_version", [], |r| r.get(0)).map_err(|e| self.err(e))?;
@@ -278,7 +278,7 @@ impl Index {
         statement.query_row([id.0 as i64], place).optional().map_err(|e| self.err(e))
     }
 
-    /// Locations of the records of a segment, or of the pinned ones alone.
+    /// Locations of all records of a segment, or only of its pinned ones.
     pub fn places(&self, segment: u64, pinned_only: bool) -> Result<Vec<Place>, Error> {
         let pinned = if pinned_only { "AND id IN (SELECT record FROM pins)" } else { "" };
         let sql = format!("SELECT {PLACE} FROM records WHERE segment = ?1 {pinned} ORDER BY id");

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// An opened store, with the damage that was found.
 pub(super) struct Opened {
     pub index: Index,
-    /// Length of each segment, bytes, by number.
+    /// Length of each segment in bytes, by the segment's number.
     pub segments: BTreeMap<u64, u64>,
     /// Number of the next segment.
     pub next_segment: u64,
@@ -449,7 +449,7 @@ impl<'a> Rebuild<'a> {
         Ok(proven)
     }
 
-    /// Cuts off the torn end of a segment and writes its summary; deletes a segment without a chunk.
+    /// Cuts off the unfinished end of a segment and writes its summary; deletes a segment without any chunk.
     fn finish(&mut self, number: u64, scan: Scan) -> Result<(), Error> {
         let path = segment_path(self.dir, number);
         if scan.chunks.is_empty() {

@@ -323,7 +323,7 @@ struct Chunk {
     channels: Channels,
     /// Expected offset of the next chunk.
     end: u64,
-    /// Faults of the chunk beside its undamaged records.
+    /// Faults in the chunk, whose undamaged records are in `records`.
     faults: Vec<Fault>,
     /// Fault if the message index of the chunk is cut off by the end of the file.
     torn: Option<Fault>,

@@ -1,4 +1,5 @@
-//! A scene of the BOP challenge: images, and cameras in one JSON file by the number of the image.
+//! A scene of the BOP challenge: images, and a JSON file with the camera of each image, by the image's
+//! number.
 
 use super::pieces::{self, Gathered, by_number, depths, json};
 use crate::input::InputError;

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Units of a depth image in a metre. From: the data set's page.
 const DEPTH_SCALE: f64 = 1000.0;
-/// Camera of its sequences. From: the data set's page, the factory's values of a PrimeSense.
+/// Camera of the sequences. From: the data set's page, the factory's values of a PrimeSense.
 const PRIMESENSE: CameraSettings = CameraSettings { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 };
 
 /// Open3D's `PinholeCameraIntrinsic`.
@@ -125,7 +125,8 @@ fn beside(folder: &Path) -> Option<PathBuf> {
     names(folder).ok()?.into_iter().find(|n| says(n) && !n.contains("trajectory")).map(|n| folder.join(n))
 }
 
-/// Poses of a `.log`, each with the number of its frame: a line of three numbers, then a matrix.
+/// Poses of a `.log` file, each with the number of its frame (the first of three numbers in a line before the
+/// matrix); `None` for a pose that is not finite.
 fn log(file: &Path) -> Result<Vec<(usize, Option<Isometry3<f64>>)>, InputError> {
     let content = text(file)?;
     let rows = pose::rows(&shown(file), &content)?;

@@ -1,4 +1,4 @@
-//! Replica as rendered for NICE-SLAM and its successors.
+//! The Replica data set as rendered for NICE-SLAM and its successors.
 
 use super::pieces::{self, Gathered, by_number, json};
 use crate::input::InputError;

@@ -1,4 +1,4 @@
-//! ScanNet as its exporter writes it: folders of images and poses with the same numbers.
+//! The ScanNet data set as its exporter writes it: folders of images and of poses with the same numbers.
 
 use super::pieces::{self, Gathered, by_number, depths};
 use crate::input::InputError;

@@ -12,7 +12,7 @@ use std::path::Path;
 const DEPTH: &str = ".depth.png";
 /// Units of a depth image in a metre. From: the data set's page.
 const DEPTH_SCALE: f64 = 1000.0;
-/// Camera of its depth images. From: the data set's page.
+/// Camera of the data set's depth images. From: the data set's page.
 const KINECT: CameraSettings = CameraSettings { fx: 585.0, fy: 585.0, cx: 320.0, cy: 240.0 };
 
 /// True for a folder with 7-Scenes frames and without a camera file; with one, the folder is in descry's own

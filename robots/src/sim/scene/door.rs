@@ -18,7 +18,7 @@ pub enum DoorState {
     Shut,
 }
 
-/// A door in a scene file. Its wall, and the rooms on either side, follow from its position.
+/// A door in a scene file. The wall in which it lies, and the rooms on either side, follow from its position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DoorSpec {

@@ -139,7 +139,7 @@ pub struct SceneSpec {
     /// Title for people.
     #[serde(default)]
     pub title: String,
-    /// One room, or several with walls between them.
+    /// Rooms: a single one, or several with walls between them.
     #[serde(default = "room::one_room", rename = "room", with = "one_or_many")]
     pub rooms: Vec<RoomSpec>,
     /// Doors in the walls between rooms.
@@ -216,7 +216,7 @@ impl FaultPlan {
 }
 
 impl SceneSpec {
-    /// Parses a scene. `file` is its name for messages.
+    /// Parses a scene; `file` is the name of the file in messages.
     ///
     /// # Errors
     /// The first error, with its place in the text and a fix.

@@ -22,7 +22,7 @@ pub struct ObjectSpec {
     /// Names of the surfaces from which the seed chooses; the first surface of the scene if left out.
     #[serde(default, with = "one_or_many", skip_serializing_if = "Vec::is_empty")]
     pub on: Vec<String>,
-    /// Weight of each surface; equal if left out.
+    /// Weight of each surface in `on` for the seed's choice; equal if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<Vec<f64>>,
     /// Name of an earlier object; this one is placed on another surface than that one.

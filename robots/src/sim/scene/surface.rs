@@ -74,7 +74,7 @@ pub struct ObstacleSpec {
     /// Thickness of the legs of a seat, metres; left out for a box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub legs_m: Option<f64>,
-    /// Height of the back above the seat, metres; left out for a seat without one.
+    /// Height of the back above the seat, metres; left out for a seat without a back.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub back_m: Option<f64>,
     /// The visits in which the obstacle is present; all if left out.

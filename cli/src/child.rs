@@ -14,7 +14,7 @@ pub(crate) const HALT: Duration = Duration::from_secs(20);
 /// Interval between checks for the end of a stopped command.
 pub(crate) const POLL: Duration = Duration::from_millis(20);
 
-/// A running command; one `Child` may cover several processes in a row.
+/// Running command, possibly in several processes one after the other.
 #[derive(Default)]
 pub(crate) struct Child(Mutex<State>);
 
@@ -36,12 +36,12 @@ pub(crate) struct Ended {
 }
 
 impl Child {
-    /// True if nothing more will run.
+    /// True if the work has ended, so that nothing more will run.
     pub(crate) fn has_ended(&self) -> bool {
         self.state(|state| state.has_ended)
     }
 
-    /// Marks the end of all work; returns true if it was stopped.
+    /// Marks the end of all work; true if the work was stopped.
     pub(crate) fn end(&self) -> bool {
         self.state(|state| {
             state.has_ended = true;

@@ -5,7 +5,8 @@ use descry_domains::load::Domain;
 use descry_domains::load::error::LoadError;
 use descry_planner::Findings;
 
-/// The findings in a domain's folder, and the grounding of each of its words.
+/// Findings in a domain's folder, and a line on what states, answers or carries out each of its
+/// predicates, functions, calls and actions; no lines for a folder that cannot be loaded.
 ///
 /// # Errors
 /// [`LoadError`] for reasons other than findings.

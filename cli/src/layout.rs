@@ -15,7 +15,7 @@ fn is_plan(text: &str) -> bool {
     words(text).next().is_some_and(|word| !word.eq_ignore_ascii_case("define"))
 }
 
-/// The words of a text in PDDL, without comments and parentheses.
+/// Symbols of a PDDL text, without comments and parentheses.
 pub fn words(text: &str) -> impl Iterator<Item = &str> {
     text.lines()
         .map(|line| line.split(';').next().unwrap_or_default())

@@ -72,7 +72,7 @@ pub(crate) fn serve(served: Served) -> io::Result<()> {
 
 struct Server {
     served: Arc<Served>,
-    /// Running calls by the text of their ID.
+    /// Running calls by the text of their request ID.
     calls: BTreeMap<String, Arc<Child>>,
     threads: Vec<JoinHandle<()>>,
 }

@@ -32,7 +32,7 @@ pub(crate) struct Served {
     pub(crate) folder: PathBuf,
     /// Options of `descry do` for every goal.
     pub(crate) options: Vec<String>,
-    /// Access token for callers; none for a server reachable from this machine alone.
+    /// Access token for callers; `None` for a server reachable from this machine alone.
     pub(crate) token: Option<String>,
 }
 
@@ -123,7 +123,7 @@ impl Agent {
         Ok(goal)
     }
 
-    /// Adds a goal; an urgent one interrupts a current goal that is not.
+    /// Adds a goal; an urgent one interrupts a current goal that is not urgent.
     fn add(&self, goal: String, urgent: bool) -> io::Result<Goal> {
         let mut inner = self.inner();
         let added = inner.goals.add(goal, urgent)?;
@@ -135,7 +135,7 @@ impl Agent {
         Ok(added)
     }
 
-    /// Cancels a goal; none if it does not exist. A finished goal stays unchanged.
+    /// Cancels a goal; `None` if it does not exist. A finished goal stays unchanged.
     fn cancel(&self, id: u64) -> io::Result<Option<Goal>> {
         let mut inner = self.inner();
         let Some(goal) = inner.goals.get(id).cloned() else { return Ok(None) };
@@ -186,7 +186,7 @@ impl Agent {
         }
     }
 
-    /// Marks a goal as running, with the command line that starts or resumes it.
+    /// Goal marked as running, with the command line that starts or resumes it.
     fn begun(&self, goal: Goal) -> (Goal, Vec<String>) {
         let words = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
         let is_there = |run: &String| Path::new(run).join("run.json").exists();
@@ -242,7 +242,7 @@ fn fresh(folder: &Path, id: u64) -> String {
     paths.find(|path| !path.exists()).unwrap_or_default().display().to_string()
 }
 
-/// The report of a goal, as from `descry do --json`; without output, a failure with its reason.
+/// Report of a goal, as from `descry do --json`; without output, a failure with its reason.
 fn report(goal: &Goal, ended: Result<Ended, String>) -> Value {
     let (out, why) = match ended {
         Ok(ended) => (ended.out, ended.told),

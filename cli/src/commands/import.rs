@@ -57,7 +57,7 @@ pub struct Arguments {
 /// Time between two lines of progress.
 const PROGRESS: Duration = Duration::from_secs(2);
 
-/// Description with the list of layouts.
+/// Help text of the command, with the list of layouts.
 fn about() -> String {
     let lines: Vec<String> = LAYOUTS.iter().map(|l| format!("\n  {:<10} {}", l.name, l.files)).collect();
     format!("Import a recording in a published layout, told from its files:{}", lines.concat())

@@ -218,8 +218,8 @@ impl AttachmentArguments {
         Ok(attachments)
     }
 
-    /// Readings sent with every call of a module: the requested ones, or else those that the module
-    /// writes.
+    /// Predicates and functions sent with every call of a module: the requested ones, or else those that
+    /// the module writes.
     fn reads(&self, task: &Task, name: &str, module: &Module) -> Result<Vec<String>, CommandError> {
         let mut asked: Option<Vec<String>> = None;
         for given in &self.attach_reads {
@@ -251,13 +251,13 @@ impl AttachmentArguments {
 
 const READS: &str = "NAME=SYMBOL,…, as in --attach-reads 'drain=battery,at'";
 
-/// The two sides of an option's `=`.
+/// Name and value on the two sides of `=` in an option's argument; an error without `=`.
 fn named<'g>(option: &str, given: &'g str, expected: &str) -> Result<(&'g str, &'g str), CommandError> {
     let message = || CommandError::BadInput(format!("{option} '{given}'\n  expected {expected}"));
     given.split_once('=').ok_or_else(message)
 }
 
-/// Module bound by a name: its own, or its function's.
+/// Module with a name: its own name, or that of its function.
 fn called<'t>(task: &'t Task, option: &str, name: &str) -> Result<&'t Module, CommandError> {
     let function = |module: &'t Module| module.function.split('@').next().unwrap_or_default();
     let names = |module: &&Module| {

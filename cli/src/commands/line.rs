@@ -25,7 +25,7 @@ const EXIT_CODES: &str = "Exit codes:
   70  a bug of descry
   130, 143, 129  stopped by Ctrl-C, by SIGTERM, by the end of its terminal";
 
-/// Example lines of each command.
+/// Example lines, by command.
 pub const EXAMPLES: [(&str, &[&str]); 25] = [
     (
         "find",
@@ -105,7 +105,7 @@ pub const EXAMPLES: [(&str, &[&str]); 25] = [
     ("help", &[]),
 ];
 
-/// The commands, with their examples.
+/// Command line of descry, with the examples of each command.
 pub fn line() -> clap::Command {
     EXAMPLES.iter().filter(|(_, lines)| !lines.is_empty()).fold(Line::command(), |line, (name, lines)| {
         let text = format!("Examples:\n  {}", lines.join("\n  "));

@@ -180,7 +180,7 @@ fn query(arguments: &QueryArguments) -> Result<Exit, CommandError> {
     Ok(Exit::No)
 }
 
-/// Narrows a query to one document of its results.
+/// Query narrowed to one document of its results.
 fn exactly(query: Query, document: &Document) -> Query {
     let before = descry_memory::RecordId(document.id.0.saturating_sub(1));
     Query { after: Some((document.stamp_ns, before)), order: Order::Oldest, limit: Some(1), ..query }

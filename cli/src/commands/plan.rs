@@ -65,7 +65,7 @@ pub struct Arguments {
     attachments: AttachmentArguments,
 }
 
-/// How planning ended, in a word.
+/// Outcome of planning, as printed in JSON.
 #[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Status {
@@ -143,8 +143,8 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
     Ok(signal.map_or(exit, Exit::of_signal))
 }
 
-/// Searches for a plan and reports results and bounds meanwhile; returns also true if the metric
-/// has no best value.
+/// Searches for a plan and reports results and bounds meanwhile; also returns a note if the metric seems
+/// to have no best value.
 fn searched(
     arguments: &Arguments,
     task: &Task,
@@ -189,7 +189,7 @@ fn searched(
 /// Minimum interval between reported bounds.
 const BETWEEN_BOUNDS: Duration = Duration::from_secs(1);
 
-/// A proven bound on the metric, or on the number of steps.
+/// Sentence on a proven bound of the metric or, without a metric, of the number of steps.
 fn bounded(task: &Task, bound: f64) -> String {
     let bound = number_text(bound);
     match &task.metric {
@@ -199,7 +199,7 @@ fn bounded(task: &Task, bound: f64) -> String {
     }
 }
 
-/// Prints the searches for a first plan and their turns.
+/// Prints the configurations of the portfolio, and the rounds in which they run.
 fn portfolio(as_json: bool) -> Result<Exit, CommandError> {
     use descry_planner::portfolio::{PORTFOLIO, ROUND_FACTOR, ROUNDS, SHORT_SHARE};
     let names = |round: &[usize]| -> Vec<&str> { round.iter().map(|&place| PORTFOLIO[place].name).collect() };
@@ -232,7 +232,7 @@ fn portfolio(as_json: bool) -> Result<Exit, CommandError> {
     Ok(Exit::Done)
 }
 
-/// A search of the portfolio in the field's words.
+/// Line that describes a configuration of the portfolio.
 fn told(configuration: &descry_planner::portfolio::Configuration) -> String {
     use descry_planner::portfolio::{Engine, Proof};
     let yes = |holds: bool, said: &'static str| if holds { said } else { "" };
@@ -264,8 +264,8 @@ fn told(configuration: &descry_planner::portfolio::Configuration) -> String {
     )
 }
 
-/// Memory of the process, bytes: resident, or the maximum once the address space is nearly used up;
-/// `None` if unknown.
+/// Resident memory of the process, bytes; `u64::MAX` once the address space is nearly used up, `None` if
+/// unknown.
 fn used_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kilobytes = |name: &str| {
@@ -278,11 +278,11 @@ fn used_bytes() -> Option<u64> {
     Some(if used_up { u64::MAX } else { resident })
 }
 
-/// Reserve of the address space for allocations between two checks, as a divisor.
+/// Part of the address space kept in reserve for allocations between two checks, as a divisor.
 const ADDRESS_RESERVE: u64 = 16;
 static ADDRESS_SPACE_BYTES: OnceLock<Option<u64>> = OnceLock::new();
 
-/// Limit of the address space, if any.
+/// Limit of the address space, bytes, if any.
 fn address_space_bytes() -> Option<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
@@ -396,7 +396,7 @@ fn show(
     Ok(())
 }
 
-/// Note that the metric may have no best value, if the plan shows this.
+/// Note that the metric seems to have no best value; `None` unless the plan shows this.
 fn ever_better(task: &Task, attachments: &Attachments, plan: &Plan) -> Option<String> {
     let (step, gain) = endless(task, attachments, plan)?;
     let arguments: String = step.arguments.iter().map(|name| format!(" {name}")).collect();

@@ -29,9 +29,9 @@ pub struct CheckArguments {
 struct Report {
     robot: String,
     kept: Vec<&'static str>,
-    /// The first failure.
+    /// First failed check; `None` if all passed.
     broken: Option<Broken>,
-    /// Every failure.
+    /// All failed checks.
     failed: Vec<Broken>,
 }
 

@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     Ok(if damaged.is_some() || !more.is_empty() { Exit::No } else { exit })
 }
 
-/// An event of another version, as raw JSON.
+/// Raw JSON of an event that another version of descry recorded.
 fn compact(event: &Value) -> String {
     serde_json::to_string(event).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Declarations of a PDDL text, and the words in it.
+//! Declarations of a PDDL text, and the symbols in it.
 
 use descry_planner::Span;
 use descry_planner::pddl::ast::{Name, Signature, Typed};
@@ -66,7 +66,7 @@ impl Kind {
 pub struct Declared {
     /// The name, in lower case.
     pub name: String,
-    /// Kind.
+    /// Kind of the declaration.
     pub kind: Kind,
     /// Span of the name.
     pub span: Span,
@@ -105,7 +105,7 @@ fn typed(kind: Kind, all: &[Typed]) -> impl Iterator<Item = (Kind, Name, Span)> 
     all.iter().map(move |t| (kind, t.name, t.types.iter().fold(t.name.span, |span, of| span.to(of.span))))
 }
 
-/// The innermost list around a span.
+/// Span of the innermost parenthesised list around a span.
 pub fn list_around(text: &str, span: Span) -> Span {
     let bytes = text.as_bytes();
     let mut depth = 0_i32;
@@ -139,7 +139,7 @@ pub fn list_around(text: &str, span: Span) -> Span {
     Span { source: span.source, start: start as u32, end: text.len() as u32 }
 }
 
-/// The comment lines right above a span, and the comment at the end of its line.
+/// Comment lines right above a span, and the comment at the end of its line.
 pub fn comments(text: &str, span: Span) -> Vec<String> {
     let start = text[..span.start as usize].rfind('\n').map_or(0, |at| at + 1);
     let mut above: Vec<String> = Vec::new();
@@ -155,7 +155,7 @@ pub fn comments(text: &str, span: Span) -> Vec<String> {
     above
 }
 
-/// The word at a byte offset, between delimiters, with its start.
+/// Symbol around a byte offset, between delimiters: its start (byte offset) and text.
 pub fn word_at(text: &str, at: usize) -> (usize, &str) {
     let is_part = |c: char| !c.is_whitespace() && !"()[]{};\"'=,<>".contains(c);
     let start =

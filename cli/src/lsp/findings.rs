@@ -17,16 +17,18 @@ use super::mends;
 use super::texts::{Lines, Texts, path_of, uri_of};
 use super::units::{self, Unit};
 
-/// Files with published findings.
+/// Files whose findings the editor shows.
 #[derive(Default)]
 pub struct Told {
     files: BTreeSet<PathBuf>,
-    /// Grounding of the words of each domain's folder, as of the last successful read.
+    /// Lines on what states, answers or carries out each predicate, function, call and action of a
+    /// domain's folder, as of the last successful read.
     grounded: BTreeMap<PathBuf, Vec<String>>,
 }
 
 impl Told {
-    /// Findings after a change of a text: its own, and those of all dependent texts.
+    /// Findings to publish after a change of a text: those of the text, and of all texts that depend on
+    /// it.
     pub fn after(&mut self, texts: &Texts, uri: &Uri) -> Vec<PublishDiagnosticsParams> {
         let path = path_of(uri);
         let text = texts.text(&path).unwrap_or_default();
@@ -61,8 +63,8 @@ impl Told {
         said.into_iter().filter_map(publish).collect()
     }
 
-    /// Findings of a domain's folder; also updates the grounding of its words, for unfinished texts after
-    /// closing their open lists.
+    /// Findings of a domain's folder; also updates the grounding of the folder's symbols, for unfinished
+    /// texts after closing their open lists.
     fn of_folder(&mut self, texts: &Texts, folder: &Path) -> BTreeMap<PathBuf, Vec<Shown>> {
         let (said, grounding) = of_folder(texts, folder);
         let is_known = self.grounded.contains_key(folder);
@@ -72,7 +74,8 @@ impl Told {
         said
     }
 
-    /// Grounding of the words of a folder, as of the last successful read.
+    /// Grounding of the symbols of a folder, one line each, as of the last successful read; empty
+    /// without one.
     pub fn grounding(&self, folder: &Path) -> &[String] {
         self.grounded.get(folder).map_or(&[], Vec::as_slice)
     }
@@ -120,7 +123,8 @@ fn of_problem(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<S
     by_file(&descry_planner::check(&domain, Some(&source)))
 }
 
-/// Grounding of the words of a folder once the open lists in its PDDL are closed.
+/// Grounding of the symbols of a folder once the open lists in its PDDL are closed; `None` if none is
+/// open.
 fn grounding_once_closed(texts: &Texts, folder: &Path) -> Option<Vec<String>> {
     let mut files = units::files(texts, folder);
     let (_, text) = files.get_mut("domain.pddl")?;
@@ -129,8 +133,8 @@ fn grounding_once_closed(texts: &Texts, folder: &Path) -> Option<Vec<String>> {
     Some(descry_domains::check::grounding(&domain))
 }
 
-/// Findings of a domain's folder, as from `descry check DIR`, and the grounding of its words if it is
-/// readable.
+/// Findings of a domain's folder, as from `descry check DIR`, and the grounding of its symbols if the
+/// folder is readable.
 fn of_folder(texts: &Texts, folder: &Path) -> (BTreeMap<PathBuf, Vec<Shown>>, Option<Vec<String>>) {
     let files = units::files(texts, folder);
     let mut all: BTreeMap<PathBuf, Vec<Shown>> =

@@ -8,8 +8,8 @@ const PAGES: [(&str, &str); 3] = [
     ("scenes", include_str!("reference/scenes.md")),
 ];
 
-/// The TOML heading in force at a byte offset, as the names between its dots, with its start; none before the
-/// first heading.
+/// TOML heading in force at a byte offset: its start (byte offset), and the names between its dots;
+/// `None` before the first heading.
 fn heading(text: &str, at: usize) -> Option<(usize, Vec<&str>)> {
     let mut start = 0;
     let mut found = None;
@@ -59,7 +59,7 @@ pub fn here<'t>(part: &str, text: &'t str, at: usize) -> Option<Here<'t>> {
     Some(Here { name: (start, name), meaning: meaning.unwrap_or_default() })
 }
 
-/// The section of a page on a table; none: the part before the first section.
+/// Section of a page on a table; `None`: the part before the first section.
 fn section<'p>(page: &'p str, table: Option<&str>) -> Option<&'p str> {
     let mut parts = page.split("\n## ");
     let Some(table) = table else { return parts.next() };

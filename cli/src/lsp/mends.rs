@@ -14,11 +14,11 @@ use super::texts::Lines;
 struct Mend {
     /// Title of the fix.
     title: String,
-    /// Text edits.
+    /// Edits of the text in which the finding is.
     edits: Vec<TextEdit>,
 }
 
-/// The fix for a finding, as data of its diagnostic; none without one.
+/// Fix for a finding, as data of its diagnostic; `None` if there is no fix.
 pub fn of(finding: &Diagnostic, text: &str) -> Option<serde_json::Value> {
     let mend = meant(finding, text).or_else(|| closed(finding, text))?;
     serde_json::to_value(mend).ok()
@@ -50,7 +50,7 @@ fn closed(finding: &Diagnostic, text: &str) -> Option<Mend> {
     Some(Mend { title, edits: vec![TextEdit { range, new_text: signs }] })
 }
 
-/// A PDDL text with every open list closed; none if all are closed.
+/// PDDL text with every open list closed; `None` if all are closed.
 pub fn all_closed(text: &str) -> Option<String> {
     let findings = descry_planner::check(&descry_planner::Source::new("", text), None);
     let mut closed = text.to_string();
@@ -60,7 +60,7 @@ pub fn all_closed(text: &str) -> Option<String> {
     (!missing.is_empty()).then_some(closed)
 }
 
-/// Place and text of missing brackets.
+/// Byte offset and text of the closing brackets that a finding reports missing.
 fn missing(finding: &Diagnostic, text: &str) -> Option<(usize, String)> {
     let (_, rest) = finding.help.as_ref()?.split_once("add `")?;
     let sign = rest.split('`').next().filter(|sign| matches!(*sign, ")" | "]"))?;

@@ -94,7 +94,7 @@ pub fn path_of(uri: &Uri) -> PathBuf {
     PathBuf::from(String::from_utf8_lossy(&decoded).into_owned())
 }
 
-/// The URI of a path; none if the path has no valid URI.
+/// URI of a path; `None` if the path has no valid URI.
 pub fn uri_of(path: &Path) -> Option<Uri> {
     let text = path.to_str()?;
     if !text.starts_with('/') {
@@ -108,8 +108,8 @@ pub fn uri_of(path: &Path) -> Option<Uri> {
     Uri::from_str(&format!("file://{encoded}")).ok()
 }
 
-/// The byte offset of a position; columns count UTF-16 units. Positions beyond the end of a line are clamped
-/// to it.
+/// Byte offset of a position whose columns count UTF-16 units. A position beyond the end of a line is
+/// clamped to that end.
 pub fn offset(text: &str, position: Position) -> usize {
     let mut start = 0;
     for _ in 0..position.line {
@@ -150,7 +150,7 @@ impl<'a> Lines<'a> {
         Position::new(line as u32, before.encode_utf16().count() as u32)
     }
 
-    /// The range of a span.
+    /// Range of a span, in lines and columns as editors count them.
     pub fn range(&self, span: Span) -> Range {
         Range::new(self.position(span.start as usize), self.position(span.end as usize))
     }

@@ -9,7 +9,7 @@ use descry_planner::pddl::parse;
 
 use super::texts::Texts;
 
-/// Kind of unit.
+/// Unit of checking that a text belongs to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unit {
     /// A file of a domain's folder.
@@ -20,7 +20,7 @@ pub enum Unit {
     Problem,
     /// A plan.
     Plan,
-    /// Something else.
+    /// Text that is not checked.
     Other,
 }
 

@@ -1,4 +1,4 @@
-//! Answers about a word: meaning, grounding, declaration, and completions.
+//! Answers about a symbol: meaning, grounding, declaration, and completions.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,8 @@ const JOINING: [&str; 13] = [
     "decrease", "assign",
 ];
 
-/// Declarations in scope of a text: its own, those of its domain and of the problem.
+/// Declarations in scope of a text, by file: path, text and declarations. A problem has its own and
+/// those of its domain in scope, a plan and a file of a folder those of the domain.
 fn in_scope(texts: &Texts, path: &Path, text: &str) -> Vec<(PathBuf, String, Vec<Declared>)> {
     let unit = units::of(texts, path, text);
     let mut files: Vec<(PathBuf, bool)> = Vec::new();
@@ -57,7 +58,7 @@ fn here(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Here> {
     Some(Here { path, text, at })
 }
 
-/// Hover text of a word: its declaration with comments, its grounding in a domain's folder, the
+/// Hover text of a symbol: its declaration with comments and its grounding in a domain's folder, or the
 /// meaning of a TOML heading or key.
 pub fn hover(texts: &Texts, told: &Told, at: &TextDocumentPositionParams) -> Option<Hover> {
     let Here { path, text, at } = here(texts, at)?;
@@ -109,7 +110,8 @@ fn span(start: usize, end: usize) -> Span {
     Span { source: 0, start: start as u32, end: end as u32 }
 }
 
-/// Place of the declaration of a word.
+/// Place of the declaration of a symbol, or of the first occurrence of a variable; `None` if there is
+/// none.
 pub fn definition(texts: &Texts, at: &TextDocumentPositionParams) -> Option<GotoDefinitionResponse> {
     let Here { path, text, at } = here(texts, at)?;
     let (start, word) = word_at(&text, at);
@@ -130,14 +132,14 @@ pub fn definition(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Goto
     (!found.is_empty()).then_some(GotoDefinitionResponse::Array(found))
 }
 
-/// The section of a definition around an offset: from a `(:` to the next.
+/// Byte range of the section of a definition around an offset: from a `(:` to the next.
 fn section(text: &str, at: usize) -> std::ops::Range<usize> {
     let start = text[..at].rfind("(:").unwrap_or(0);
     let end = text[at..].find("(:").map_or(text.len(), |n| at + n);
     start..end
 }
 
-/// Variables in a part of a text, each at its first occurrence.
+/// Variables in a part of a text, each with the byte offset of its first occurrence.
 fn variables(text: &str, part: std::ops::Range<usize>) -> Vec<(usize, &str)> {
     let mut found: Vec<(usize, &str)> = Vec::new();
     for (at, _) in text[part.clone()].match_indices('?') {
@@ -149,7 +151,7 @@ fn variables(text: &str, part: std::ops::Range<usize>) -> Vec<(usize, &str)> {
     found
 }
 
-/// Completions at a place.
+/// Completions at a position in a text.
 pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<CompletionResponse> {
     let Here { path, text, at } = here(texts, at)?;
     let (start, _) = word_at(&text, at);
@@ -213,7 +215,8 @@ pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Comp
     Some(CompletionResponse::Array(items))
 }
 
-/// Formatting of a text as one edit; none if it is formatted already or cannot be parsed.
+/// Formatting of a text as one edit; no edit if formatted already, `None` for TOML and JSON files and
+/// for texts that cannot be parsed.
 pub fn formatting(texts: &Texts, uri: &Uri) -> Option<Vec<TextEdit>> {
     let path = path_of(uri);
     let text = texts.text(&path)?;

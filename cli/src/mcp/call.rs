@@ -10,7 +10,7 @@ use descry_agent::exit::Exit;
 /// Maximum size of the narration in the answer on a failure, bytes; its end is kept.
 const TOLD_BYTES: usize = 4000;
 
-/// Runs a tool and returns its result in the protocol's form; none for a cancelled call.
+/// Runs a tool and returns its result in the protocol's form; `None` for a cancelled call.
 pub(super) fn carry_out(
     child: &Child,
     task: &Task,

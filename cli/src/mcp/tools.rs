@@ -9,7 +9,7 @@ use super::Served;
 /// Default time limit of planning, seconds.
 const PLANNING_S: f64 = 60.0;
 
-/// A tool.
+/// Tool that assistants can call.
 pub(super) struct Tool {
     pub(super) name: &'static str,
     about: &'static str,
@@ -47,7 +47,7 @@ enum Holds {
     Scene,
     /// Path of an existing file or folder.
     Path,
-    /// Several such paths.
+    /// Paths of existing files or folders.
     Paths,
     Number,
     Whole,
@@ -276,7 +276,8 @@ impl Tool {
     }
 }
 
-/// The real body, if requested.
+/// Address of the real body; `None` if the call asks for simulation, an error if the server has no real
+/// body.
 fn robot(given: &Map<String, Value>, served: &Served) -> Result<Option<String>, String> {
     match (given.get(REAL.name), &served.robot) {
         (None | Some(Value::Bool(false)), _) => Ok(None),
@@ -290,7 +291,7 @@ fn robot(given: &Map<String, Value>, served: &Served) -> Result<Option<String>, 
     }
 }
 
-/// Conversion of a call's values to words of a command line.
+/// Conversion of a call's arguments to words of a command line.
 struct Values<'a> {
     given: &'a Map<String, Value>,
     folder: &'a Path,
@@ -350,7 +351,8 @@ impl Values<'_> {
         self.named(text, Path::exists)
     }
 
-    /// A built-in name, unless the server's folder has such a path; else a path below the folder.
+    /// Name of something built-in, unless the server's folder has such a path; else a path below the
+    /// folder.
     fn named(&self, text: &str, is_path: fn(&Path) -> bool) -> Result<String, String> {
         let is_name = text.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
         if is_name && !is_path(&self.folder.join(text)) { Ok(text.to_string()) } else { self.path(text) }

@@ -29,21 +29,21 @@ pub(super) enum State {
     Cancelled,
 }
 
-/// A goal that was given.
+/// Goal given to the service, with its state.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Goal {
-    /// Number, from 1.
+    /// Number of the goal, from 1.
     pub(super) id: u64,
     /// Goal in words.
     pub(super) goal: String,
-    /// True if it takes precedence over goals that are not urgent.
+    /// True if the goal takes precedence over goals that are not urgent.
     pub(super) urgent: bool,
     pub(super) state: State,
-    /// Folder of its run, once it has one.
+    /// Folder of the goal's run; `None` before the first start.
     pub(super) run: Option<String>,
-    /// The process that pursues it.
+    /// ID of the process that pursues the goal, while it runs.
     pub(super) process: Option<u32>,
-    /// Report, as from `descry do --json`.
+    /// Report, as from `descry do --json`; `None` before the end.
     pub(super) report: Option<Value>,
 }
 
@@ -69,12 +69,12 @@ const JOURNAL: &str = "goals.jsonl";
 /// File name of the lock; the file names its holder.
 const LOCK: &str = "serve.lock";
 
-/// A line of the journal.
+/// Line of the journal.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum Line {
     Goal(Goal),
-    /// Passes over damaged lines before this one.
+    /// Damaged lines before this one, which are passed over.
     Passed {
         /// Numbers of the lines, from 1.
         passed_over: Vec<usize>,
@@ -94,7 +94,7 @@ impl Read {
     /// Reads the lines of a journal: the last line of a goal is its state.
     ///
     /// # Errors
-    /// The number of a damaged line before others.
+    /// The number, from 1, of a damaged line that a goal follows.
     fn of(bytes: &[u8]) -> Result<Self, usize> {
         let mut read = Read { next_id: 1, ..Read::default() };
         for (n, line) in bytes.split(|byte| *byte == b'\n').enumerate() {

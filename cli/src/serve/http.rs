@@ -99,7 +99,8 @@ async fn answer(
     })
 }
 
-/// Refusal of a caller: a missing token, or a cross-site request of a browser; none if it is allowed.
+/// Refusal of a caller: a missing token, or a cross-site request of a browser; `None` if the request is
+/// allowed.
 fn refused(request: &Request<Incoming>, port: u16, agent: &Agent) -> Option<Response<Body>> {
     match &agent.served.token {
         Some(token) => {

@@ -15,7 +15,7 @@ use crate::source::Source;
 pub struct Cluster {
     /// Number of shards.
     pub shards: usize,
-    /// Parallel jobs, and processors, of each shard.
+    /// Number of parallel jobs, and of processors, of each shard.
     pub threads: usize,
     /// Folder of the results, shared by all shards.
     pub out: PathBuf,

@@ -24,7 +24,7 @@ pub enum ExperimentError {
         found.experiment, found.hash, found.jobs, found.version, expected.experiment, expected.hash, expected.jobs, expected.version
     )]
     Another {
-        /// The journal.
+        /// Path of the journal.
         path: String,
         /// First line of the journal.
         found: Box<Header>,
@@ -34,7 +34,7 @@ pub enum ExperimentError {
     /// A file with the name of a journal but another content.
     #[error("{path}: this is no journal of an experiment\n  name another folder with --out")]
     NoJournal {
-        /// The file.
+        /// Path of the file.
         path: String,
     },
     /// Another process is working in the folder.
@@ -42,16 +42,16 @@ pub enum ExperimentError {
         "{folder}: another process is at work on this experiment\n  wait for it, or give each its own --shard"
     )]
     Busy {
-        /// The folder.
+        /// Path of the folder.
         folder: String,
     },
     /// Two jobs have the same ID.
     #[error("the job \"{id}\" is there twice\n  remove what the file lists twice")]
     Twice {
-        /// Their ID.
+        /// ID of both jobs.
         id: String,
     },
-    /// Shards are missing.
+    /// Jobs are missing from the merged folders.
     #[error(
         "{missing} of {all} jobs are in none of the folders, the first of them \"{first}\"\n  do the missing shards, or leave --merge out to do them here"
     )]
@@ -60,7 +60,7 @@ pub enum ExperimentError {
         missing: usize,
         /// Number of all jobs.
         all: usize,
-        /// First of them.
+        /// ID of the first missing job.
         first: String,
     },
     /// The disk is full; journalled jobs are kept.
@@ -70,7 +70,7 @@ pub enum ExperimentError {
     NoRoom {
         /// Folder of the results.
         folder: String,
-        /// The job that failed and does not count.
+        /// ID of the failed job, which does not count.
         job: String,
         /// Error of the job.
         because: String,

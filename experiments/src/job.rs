@@ -6,10 +6,10 @@ use serde_json::{Map, Value};
 /// Named values, in display order.
 pub type Row = Map<String, Value>;
 
-/// One combination of the variables.
+/// Job: one combination of the experiment's variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
-    /// Unique in the experiment, the same on every machine, such as `scene=0012 poses=8 policy=plan`.
+    /// ID, unique in the experiment, the same on every machine: `scene=0012 poses=8 policy=plan`.
     pub id: String,
     /// Factors of the experiment, with their values in this job.
     pub factors: Row,
@@ -46,9 +46,9 @@ pub struct Outcome {
 /// A line of the journal: a finished job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finished {
-    /// The job's id.
+    /// ID of the job.
     pub job: String,
-    /// Its factors with its measurements.
+    /// Rows of measurements, each with the factors of the job.
     pub rows: Vec<Row>,
     /// Wall-clock times.
     #[serde(default)]
@@ -70,5 +70,5 @@ impl Finished {
     }
 }
 
-/// A finished job, with its number among all jobs.
+/// Finished job, with its index among all jobs.
 pub type Numbered<'a> = (usize, &'a Finished);

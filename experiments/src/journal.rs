@@ -24,7 +24,7 @@ pub struct Journal {
     file: File,
 }
 
-/// The finished jobs of a journal by their ids.
+/// Finished jobs of a journal, by ID.
 pub type Done = BTreeMap<String, Finished>;
 
 impl Journal {
@@ -32,8 +32,8 @@ impl Journal {
     /// lines.
     ///
     /// # Errors
-    /// [`ExperimentError`] if it belongs to another experiment, another process holds it, or the disk
-    /// refuses.
+    /// [`ExperimentError`] if the journal belongs to another experiment, another process holds it, or
+    /// the disk refuses.
     pub fn open(folder: &Path, header: &Header) -> Result<(Self, Done, usize), ExperimentError> {
         let path = folder.join(FILE);
         let io = |e: std::io::Error| ExperimentError::file(&path, &e);
@@ -76,7 +76,7 @@ impl Journal {
 /// Reads the journal of a folder without locking it; empty if there is none.
 ///
 /// # Errors
-/// [`ExperimentError`] if it belongs to another experiment or cannot be read.
+/// [`ExperimentError`] if the journal belongs to another experiment or cannot be read.
 pub fn done(folder: &Path, header: &Header) -> Result<Done, ExperimentError> {
     let path = folder.join(FILE);
     if !path.exists() {

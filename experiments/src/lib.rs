@@ -58,7 +58,7 @@ impl std::str::FromStr for Shard {
 pub struct Options {
     /// Folder of the results.
     pub out: PathBuf,
-    /// The shard to run; none: all jobs.
+    /// Shard to run; `None`: all jobs.
     pub shard: Option<Shard>,
     /// Folders to merge, without running any job.
     pub merge: Vec<PathBuf>,
@@ -66,9 +66,9 @@ pub struct Options {
     pub threads: usize,
     /// Free disk space below which a failed job does not count, and no further job starts, bytes.
     pub least_free_bytes: u64,
-    /// Ends the batch early.
+    /// Request to end the batch early.
     pub stop: Stop,
-    /// Receives progress messages, occasionally, where there is no terminal for a bar.
+    /// Function that receives progress messages, occasionally, where there is no terminal for a bar.
     pub tell: fn(&str),
 }
 
@@ -83,7 +83,7 @@ pub enum Ended {
         done: usize,
         /// Number of all jobs.
         all: usize,
-        /// The shard's folder.
+        /// Folder of the shard.
         folder: PathBuf,
     },
 }

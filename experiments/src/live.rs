@@ -28,7 +28,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// The batch of a file with its results in a folder.
+    /// Batch of an experiment file, with its results in a folder.
     ///
     /// # Errors
     /// [`ExperimentError`] if the file or the folder cannot be used.

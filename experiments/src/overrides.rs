@@ -73,7 +73,7 @@ enum Inner<'t> {
 }
 
 impl Inner<'_> {
-    /// The keys or entries of the value at a path.
+    /// Sentence on the keys or entries of the value at a path.
     fn has(&self, path: &str) -> String {
         let path = if path.is_empty() { "the file".to_owned() } else { format!("`{path}`") };
         match self {

@@ -71,7 +71,7 @@ impl Progress {
     }
 }
 
-/// The page of results, or of a batch under way.
+/// HTML page of the results, or of a batch under way.
 pub fn html(
     (title, about): (&str, &str),
     facts: &Facts,

@@ -21,10 +21,11 @@ const RIGHT: f64 = 24.0;
 const BOTTOM: f64 = 54.0;
 /// Height of a row of the legend, and of a line of the title, pixels.
 const ROW: f64 = 19.0;
-/// Height of the strip of counts under a reliability plot.
+/// Height of the strip of counts under a reliability plot, pixels.
 const STRIP: f64 = 64.0;
-/// Average width of a letter in the axes' text and in the title, pixels.
+/// Average width of a letter in the axes' text, pixels.
 const LETTER: f64 = 6.6;
+/// Average width of a letter in the title, pixels.
 const TITLE_LETTER: f64 = 7.6;
 /// Maximum number of letters in a line of a category's name.
 const CATEGORY: usize = 20;
@@ -36,7 +37,7 @@ pub struct Point {
     pub at: f64,
     /// Measured value.
     pub value: f64,
-    /// 95 % interval.
+    /// 95 % interval; `None` if unknown.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -51,12 +52,12 @@ pub struct Series {
     pub broken: bool,
 }
 
-/// An axis.
+/// Axis of a plot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Label of the axis, with its unit.
     pub label: String,
-    /// Fixed ends; none: from the data.
+    /// Fixed ends; `None`: from the data.
     pub range: Option<[f64; 2]>,
 }
 
@@ -115,7 +116,7 @@ impl Plot {
         }
     }
 
-    /// Heading.
+    /// Heading of the plot.
     pub fn title(&self) -> &str {
         match self {
             Self::Lines { title, .. } | Self::Dots { title, .. } => title,
@@ -133,7 +134,7 @@ impl Plot {
     }
 }
 
-/// A rectangle of the plot with its scales.
+/// Sides of the plot's data area, pixels.
 struct Frame {
     left: f64,
     top: f64,

@@ -21,8 +21,9 @@ const STACK_BYTES: usize = 16 << 20;
 /// Interval between lines of progress where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(15);
 
-/// Runs these jobs, `before` others of which are done already, and appends each to the journal. Runs record into `scratch`, which is emptied afterwards.
-/// On a stop, jobs under way do not count. Returns the finished jobs in the order in which they ended.
+/// Runs the jobs `todo` (indices) and appends each to the journal; `before` other jobs are done already.
+/// Jobs record into `scratch`, which is emptied afterwards. On a stop, jobs under way do not count.
+/// Returns the finished jobs in the order in which they ended.
 ///
 /// # Errors
 /// [`ExperimentError::File`] if the journal cannot be written, [`ExperimentError::NoRoom`] if a job fails
@@ -122,9 +123,11 @@ fn collect(
 /// Progress on standard error: a bar on a terminal, occasional lines elsewhere.
 struct Progress {
     bar: Option<ProgressBar>,
-    /// Number of all jobs, of those done before, and of those done by now.
+    /// Number of all jobs.
     all: usize,
+    /// Number of jobs done before.
     before: usize,
+    /// Number of jobs done by now.
     done: usize,
     failed: usize,
     began: Instant,

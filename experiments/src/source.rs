@@ -54,7 +54,7 @@ impl Source {
         Ok(())
     }
 
-    /// Its path for messages, with the assignments.
+    /// Path of the file for messages, with the assignments.
     pub(crate) fn label(&self) -> String {
         match self.assignments.is_empty() {
             true => self.path.display().to_string(),

@@ -28,7 +28,7 @@ const SEED: u64 = 4;
 pub struct Estimate {
     /// Value.
     pub value: f64,
-    /// 95 % interval; none if there are too few groups.
+    /// 95 % interval; `None` if there are too few groups.
     pub interval: Option<[f64; 2]>,
     /// Number of observations.
     pub n: usize,
@@ -213,7 +213,8 @@ pub fn reliability(forecasts: &[Forecast], bins: usize) -> Vec<Bin> {
         .collect()
 }
 
-/// Expected calibration error: the distance between stated and observed, weighted by the bins' counts; none without forecasts.
+/// Expected calibration error: the distance between stated and observed shares, weighted by the bins'
+/// counts; `None` without forecasts.
 pub fn calibration_error(forecasts: &[Forecast], bins: usize) -> Option<f64> {
     let weighted = |b: &Bin| b.observed.n as f64 * (b.stated - b.observed.value).abs();
     let sum: f64 = reliability(forecasts, bins).iter().map(weighted).sum();

@@ -7,13 +7,13 @@ use super::statistics::Estimate;
 /// A table with its heading.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
-    /// Heading.
+    /// Heading of the table.
     pub title: String,
     /// Note below the table: meaning of its numbers and intervals.
     pub note: String,
     /// Column names, with units.
     pub head: Vec<String>,
-    /// Cells.
+    /// Cells, row by row.
     pub rows: Vec<Vec<String>>,
 }
 

@@ -86,7 +86,7 @@ fn save(folder: &Path, name: &str, text: &str) -> Result<(), ExperimentError> {
         .map_err(|e| ExperimentError::file(&path, &e))
 }
 
-/// The failed jobs, grouped by reason with a count.
+/// Sections on the failed jobs, grouped by reason with a count; empty if none failed.
 pub(super) fn failures<'a>(finished: impl IntoIterator<Item = &'a Finished>) -> Vec<Section> {
     let mut reasons = std::collections::BTreeMap::<&str, Vec<&str>>::new();
     for job in finished {
@@ -145,7 +145,7 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// Table of wall-clock times over all jobs.
+/// Table of wall-clock times over all jobs; `None` if nothing was timed.
 fn clock_table(finished: &[Finished]) -> Option<Table> {
     let mut seen = BTreeSet::new();
     let names: Vec<&String> =

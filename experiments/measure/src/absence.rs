@@ -23,7 +23,7 @@ const TARGET: &str = "cup A";
 /// Maximum distance between stated and true position for a found cup, metres.
 const FOUND_M: f64 = 0.05;
 
-/// Statement after one look.
+/// Statements about the target after one view.
 #[derive(Clone, Copy, Default)]
 struct Said {
     there: f64,
@@ -132,7 +132,7 @@ fn row(name: &str, said: Vec<(bool, Said)>) -> Reliability {
     told
 }
 
-/// Statements after each look at one arrangement.
+/// Statements after each view of one arrangement.
 async fn one(
     domain: &Domain,
     spec: &SceneSpec,

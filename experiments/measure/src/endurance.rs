@@ -148,7 +148,7 @@ fn clouds(dir: &Path, count: u64) -> Outcome {
 const RATE_HZ: u64 = 3500;
 const CHILDREN: u64 = 100;
 
-/// Speed-up of the stress over real time.
+/// Factor by which the transforms arrive faster than in real time.
 const SPEED_UP: u64 = 10;
 
 fn transforms(dir: &Path, seconds: u64) -> Outcome {

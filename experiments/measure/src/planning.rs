@@ -1,9 +1,10 @@
 //! Time of a planning round in the tabletop domain: `cargo run --release -p descry-measure --bin planning`
 //!
-//! Posts on a table hide parts of it from parts of the room; a look shows the unoccluded spots, and is
-//! expected to raise the confidence by the share of newly shown spots. For 5, 20 and 100 candidate poses,
-//! prints a JSON line: planning time from the text on (least and median of several rounds, each with an empty
-//! cache), the share of the attachments in it, their calls, and the plan.
+//! Posts on a table hide parts of the table from parts of the room; a view shows the unoccluded spots,
+//! and is expected to raise the confidence by the share of newly shown spots. For 5, 20 and 100
+//! candidate poses, prints a JSON line: planning time from the text on (least and median of several
+//! rounds, each with an empty cache), the share of the attachments in that time, their calls, and the
+//! plan.
 
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -18,7 +19,7 @@ const ROUNDS: usize = 15;
 
 /// Speed of a drive, as in the simulated room.
 const SPEED_M_PER_S: f64 = 0.5;
-/// Posts on the table: x, y, radius.
+/// Posts on the table: x, y and radius, metres.
 const POSTS_M: [[f64; 3]; 4] = [[0.1, 0.05, 0.09], [-0.2, -0.1, 0.07], [0.15, -0.3, 0.08], [-0.1, 0.3, 0.06]];
 
 /// Poses around a table, and the visibility of its spots from each.

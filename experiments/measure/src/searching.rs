@@ -14,20 +14,21 @@ use descry_robots::sim::{Scene, SimOptions, SimRobot};
 use descry_robots::{CancellationToken, Progress, Robot};
 use descry_skills::{Call, Context, SkillFailure};
 
-/// What is asked for where.
+/// Search task: a goal in a simulated scene.
 pub struct Search<'a> {
     pub domain: &'a Domain,
     pub scene: Scene,
     pub options: SimOptions,
-    /// The goal, in words.
+    /// Goal in words.
     pub goal: &'a str,
-    /// The most looks.
+    /// Maximum number of views.
     pub looks: usize,
 }
 
 impl Search<'_> {
-    /// Takes the looks: the first from the start, each later one from the pose that `choose` takes out of those left; ends
-    /// where `hear` has nothing to add after one.
+    /// Takes the views: the first from the start, each later one from the pose whose index `choose`
+    /// returns for the poses left. Ends after the first view for which `hear` returns true; returns what
+    /// `hear` has made of each view.
     pub async fn run<T>(
         self,
         mut choose: impl FnMut(&[String]) -> usize,
@@ -76,7 +77,7 @@ impl Search<'_> {
     }
 }
 
-/// Carries a call out and takes in what came of it.
+/// Carries a call out and updates the world model from its outcome.
 async fn act(
     world: &mut World<'_>,
     robot: &dyn Robot,

@@ -16,8 +16,9 @@ use std::time::Instant;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Number of repetitions after a warm-up, and total time after which an operation is cut short, seconds.
+/// Maximum number of repetitions after a warm-up.
 const REPETITIONS: usize = 15;
+/// Time after which an operation is repeated no more, seconds.
 const LONGEST_S: f64 = 5.0;
 const EDGE_M: f32 = 0.01;
 const NEIGHBOURS: usize = 20;
@@ -44,7 +45,7 @@ fn read(path: &str) -> Result<Cloud, Failure> {
     Ok(loaded.cloud)
 }
 
-/// One row of the table.
+/// Times an operation; returns its row of the output, and its result.
 fn time<T>(
     op: &str,
     n: usize,

@@ -44,7 +44,7 @@ struct Text {
     goal: String,
     /// The object to find, by its name or kind in the scene.
     target: String,
-    /// Runs of each case, each in an arrangement of its own.
+    /// Number of runs of each case, each in an arrangement of its own.
     runs: usize,
     /// Seed of the first arrangement; each further one has the next.
     #[serde(default = "default_seed")]
@@ -55,7 +55,7 @@ struct Text {
     /// Policy that chooses where to look next, from the list above.
     #[serde(default = "default_policy")]
     policy: String,
-    /// Maximum distance between the stated and the true position of a found object.
+    /// Maximum distance between the stated and the true position of a found object, metres.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
     /// Cases, each with its injected faults.
@@ -90,7 +90,7 @@ fn default_tolerance_m() -> f64 {
     0.05
 }
 
-/// The experiment.
+/// Fault-injection experiment, as read from its file.
 struct Faults {
     head: Head,
     text: Text,
@@ -142,7 +142,7 @@ pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
 }
 
 impl Faults {
-    /// Case and run of a job.
+    /// Case and run number of a job.
     fn setting(&self, number: usize) -> (&Case, usize) {
         (&self.text.cases[number / self.text.runs], number % self.text.runs)
     }

@@ -54,7 +54,7 @@ struct Text {
     /// Number of views, evenly around the surface.
     #[serde(default = "default_poses")]
     poses: usize,
-    /// Distance of the views from the centre of the surface.
+    /// Distance of the views from the centre of the surface, metres.
     #[serde(default = "default_distance_m")]
     distance_m: f64,
     /// Sets of arrangements.
@@ -89,13 +89,13 @@ fn default_distance_m() -> f64 {
     1.4
 }
 
-/// A recogniser by its name.
+/// Constructor of a recogniser.
 type Make = fn() -> Box<dyn Recogniser>;
 
 const RECOGNISERS: [(&str, Make); 2] =
     [("descry", || Box::new(Descry::default())), ("published", || Box::new(Published::default()))];
 
-/// The experiment.
+/// Experiment of Figure 4, as read from its file.
 struct Figure4 {
     head: Head,
     text: Text,
@@ -206,19 +206,19 @@ impl Kind for Figure4 {
     }
 }
 
-/// A cell of the figure.
+/// Cell of the figure: the results of one set, recogniser, mode and number of views.
 #[derive(Debug, Clone, Default)]
 struct Cell {
     /// One entry for each arrangement: its number; correct and wrong percepts of the kind; objects of the
     /// kind found by their own name; all objects of the kind.
     counts: Vec<(u64, [f64; 4])>,
     forecasts: Vec<(f64, bool)>,
-    /// Look-alikes with a handle: number classified as the kind, and total, before and after enough of the
-    /// handle was seen.
+    /// Look-alikes with a handle: number classified as the kind, and total; first before, then after
+    /// enough of the handle was seen.
     handled: [(usize, usize); 2],
 }
 
-/// Groups the rows by recogniser, number of views, and single or merged.
+/// Groups the rows by set, recogniser, single or merged, and number of views.
 fn cells(finished: &[Numbered<'_>]) -> BTreeMap<(String, String, String, u64), Cell> {
     let mut cells = BTreeMap::<_, Cell>::new();
     for &(number, job) in finished {

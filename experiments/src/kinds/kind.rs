@@ -14,7 +14,7 @@ use crate::job::{Job, Numbered, Outcome, Row};
 use crate::page::Section;
 use crate::source::Source;
 
-/// Runtime for the run of a job.
+/// Asynchronous runtime for the run of a job.
 pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, String> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     runtime.map_err(|e| format!("the runtime could not be started: {e}"))
@@ -48,7 +48,7 @@ pub trait Kind: Send + Sync {
 pub struct Head {
     /// The experiment's name.
     pub name: String,
-    /// One of the kinds.
+    /// Name of the kind of experiment.
     pub kind: String,
     /// Purpose of the experiment, in a line.
     #[serde(default)]

@@ -8,7 +8,8 @@ use crate::job::Row;
 use crate::statistics::{self, Pair};
 use crate::table::{Table, number, shown};
 
-/// Runs of a setting by seed and whatever else settings share, such as the goal.
+/// Rows of a setting's runs, by seed and by the number of whatever else settings share, such as the
+/// goal.
 pub(super) type Runs<'a> = BTreeMap<(u64, usize), &'a Row>;
 
 const MEASURES: [(&str, usize); 4] = [("right", 3), ("views", 2), ("metres", 2), ("seconds", 1)];
@@ -16,7 +17,7 @@ const NOTE: &str = "Runs with the same seed, goal and faults in pairs, of which 
                     setting less the first, with an interval bootstrapped over arrangements, 95 %; p is that of the two-sided \
                     sign-flip permutation test over arrangements, not corrected for the number of rows.";
 
-/// Compares each further setting with the first, by measure; none without pairs.
+/// Compares each further setting with the first, by measure; `None` without pairs.
 pub(super) fn table(of: &str, settings: &[(&str, Runs<'_>)]) -> Option<Table> {
     let ((first, reference), others) = settings.split_first()?;
     let mut table = Table::new(

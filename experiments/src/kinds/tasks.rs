@@ -42,14 +42,15 @@ struct Text {
     domain: String,
     /// Scene of the domain, or a file.
     scene: String,
-    /// Runs of each goal, policy and case, each in an arrangement of its own.
+    /// Number of runs of each goal, policy and case, each in an arrangement of its own.
     runs: usize,
     /// Seed of the first arrangement; each further one has the next.
     #[serde(default = "default_seed")]
     first_seed: u64,
     /// Policies that choose where to look next, from the list above.
     policies: Vec<String>,
-    /// Maximum distance along the floor between the stated and the true position of a found object.
+    /// Maximum distance along the floor between the stated and the true position of a found object,
+    /// metres.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
     /// Goals; each is pursued with each policy and case.
@@ -110,7 +111,7 @@ fn nothing_goes_wrong() -> Vec<Case> {
     vec![Case { name: "none".into(), robot: None, faults: Vec::new() }]
 }
 
-/// The experiment.
+/// Experiment on tasks, as read from its file.
 struct Tasks {
     head: Head,
     text: Text,
@@ -120,7 +121,7 @@ struct Tasks {
     goals: Vec<Goal>,
 }
 
-/// One combination of the variables.
+/// Setting of a job: one combination of the variables.
 struct Setting<'a> {
     goal: usize,
     case: &'a Case,

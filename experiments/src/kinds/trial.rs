@@ -35,13 +35,13 @@ pub(super) const NOTE: &str = "Shares with Wilson's intervals; means with interv
 
 /// Settings of one run.
 pub(super) struct Trial<'a> {
-    /// Domain.
+    /// Domain of the goal.
     pub domain: &'a Domain,
-    /// Goal.
+    /// Goal that is pursued.
     pub goal: &'a Goal,
     /// The scene; in a program's world, places and objects have the same names.
     pub spec: &'a SceneSpec,
-    /// The command line of a program with its own world; none: the simulator.
+    /// Command line of a program with its own world; `None`: the simulator.
     pub program: Option<&'a str>,
     /// Targets of the search: names or kinds in the scene.
     pub targets: &'a [String],
@@ -53,7 +53,7 @@ pub(super) struct Trial<'a> {
     pub faults: FaultPlan,
     /// Name of the policy.
     pub policy: &'a str,
-    /// True if the first look is taken from the start, whatever the policy.
+    /// True if the first view is taken from the start, whatever the policy.
     pub first_look_here: bool,
     /// Maximum distance between the stated and the true position of a found object, metres.
     pub tolerance_m: f64,
@@ -79,9 +79,9 @@ pub(super) struct Lived {
     /// Number of completed executions of each action, by name.
     pub carried: BTreeMap<String, usize>,
     /// Seed of the arrangement: the run's, or a later one where that seed has no arrangement with the
-    /// requested occlusion; none in a program's world.
+    /// requested occlusion; `None` in a program's world.
     pub arrangement: Option<u64>,
-    /// Share of the target that was visible from the start.
+    /// Share of the target that was visible from the start; `None` if unknown.
     pub share: Option<f64>,
     /// Wall-clock times.
     pub clock: Row,
@@ -136,9 +136,9 @@ struct Staged {
     body: Body,
     /// Goal as parsed for this body.
     goal: Goal,
-    /// Seed of the arrangement; none in a program's world.
+    /// Seed of the arrangement; `None` in a program's world.
     arrangement: Option<u64>,
-    /// Share of the target that is visible from the start.
+    /// Share of the target that is visible from the start; `None` if unknown.
     share: Option<f64>,
     foresight: Option<Foresight>,
 }
@@ -244,12 +244,13 @@ pub struct Measured {
     pub metres: f64,
     /// Duration on the body's clock, seconds.
     pub seconds: f64,
-    /// The stated probability, and true if the event occurred.
+    /// Probability stated at the end, and true if the event occurred; `None` if no probability was
+    /// stated.
     pub forecast: Option<(f64, bool)>,
 }
 
 impl Measured {
-    /// Reads a row; none for a failed job.
+    /// Reads a row; `None` for a failed job.
     pub fn read(group: u64, row: &Row) -> Option<Self> {
         let truth = |key: &str| row.get(key).and_then(Value::as_bool);
         let number = |key: &str| row.get(key).and_then(Value::as_f64);

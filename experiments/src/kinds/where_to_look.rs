@@ -42,7 +42,7 @@ struct Text {
     goal: String,
     /// The object to find, by its name or kind in the scene.
     target: String,
-    /// Arrangements; each has one level of occlusion, in turn.
+    /// Number of arrangements; each has one level of occlusion, in turn.
     scenes: usize,
     /// Seed of the first arrangement; each further one has the next.
     #[serde(default = "default_seed")]
@@ -58,12 +58,12 @@ struct Text {
     poses: Vec<usize>,
     /// Policies that choose where to look next, from the list above.
     policies: Vec<String>,
-    /// The policy to be compared with others.
+    /// Policy that is compared with others.
     ours: String,
-    /// The policies it is compared with.
+    /// Policies with which `ours` is compared.
     #[serde(default)]
     against: Vec<String>,
-    /// Maximum distance between the stated and the true position of a found object.
+    /// Maximum distance between the stated and the true position of a found object, metres.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
     /// Levels of occlusion, in turn.
@@ -93,7 +93,7 @@ fn default_tolerance_m() -> f64 {
     0.05
 }
 
-/// The experiment.
+/// Comparison of policies, as read from its file.
 struct WhereToLook {
     head: Head,
     text: Text,
@@ -104,7 +104,7 @@ struct WhereToLook {
     jobs: Vec<Setting>,
 }
 
-/// One combination of the variables.
+/// Setting of a job: one combination of the variables.
 #[derive(Debug, Clone)]
 struct Setting {
     scene: usize,

@@ -5,9 +5,9 @@ const TICKS: f64 = 6.0;
 
 /// A linear scale.
 pub struct Scale {
-    /// Value at the start.
+    /// Value at the start of the axis.
     pub low: f64,
-    /// Value at the end.
+    /// Value at the end of the axis.
     pub high: f64,
     from: f64,
     to: f64,

@@ -16,11 +16,12 @@ use std::time::Instant;
 
 /// Voxel size for measuring coverage, metres.
 const COVERAGE_M: f32 = 0.005;
-/// Numbers of views of partial models: on the turntable, and by the robot.
+/// Numbers of views from which partial models are learned on the turntable.
 const TURNTABLE_STEPS: [usize; 3] = [1, 3, 14];
+/// Numbers of views from which partial models are learned by the robot; 100 stands for all.
 const ROBOT_STEPS: [usize; 3] = [1, 3, 100];
 
-/// Origin of a model.
+/// Origin of a model: perfect poses, or learned by the robot in a controlled or an uncontrolled place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Perfect,

@@ -14,13 +14,14 @@ use descry_perception::nalgebra::{SMatrix, SVector};
 const ROUNDS: usize = 30;
 /// Ridge penalty on the weights.
 const RIDGE: f64 = 0.02;
-/// Number of learned objects, with as many unknown ones, and of scenes for each set.
+/// Number of learned objects in a set; a set has as many unknown ones.
 const KNOWN: usize = 16;
+/// Number of scenes for each set of objects.
 const SCENES: usize = 20;
 
-/// Numbers of views of the models: sparse models are confused most easily.
+/// Numbers of views of the models, in turn: sparse models are confused most easily.
 const LOOKS: [usize; 4] = [1, usize::MAX, 2, usize::MAX];
-/// Number of leaflets in a scene: flat prints fit any model known from one side only.
+/// Number of leaflets in every second scene: flat prints fit any model known from one side only.
 const LEAFLETS: usize = 4;
 
 /// Models as learned by the robot and by a turntable, alternately.

@@ -155,7 +155,8 @@ pub fn surface_off_m(surface: &Cloud, said: &Isometry3<f64>, truly: &Isometry3<f
 /// Maximum mean surface distance of a correct answer, metres.
 pub const RIGHT_M: f64 = 0.01;
 
-/// True if an answer is right.
+/// True if the answer's pose puts the surface of the body within [`RIGHT_M`] of the surface at the true
+/// pose.
 pub fn is_right(scene: &Scene, surfaces: &[Cloud], body: usize, found: &Recognised) -> bool {
     scene.things.iter().any(|(i, pose)| {
         *i == body && surface_off_m(&surfaces[body], &found.world_from_model, pose) < RIGHT_M
@@ -185,7 +186,7 @@ impl Tally {
     }
 }
 
-/// A library of models.
+/// Library of the models, in their order.
 pub fn library(models: &[&Model]) -> Library {
     let mut library = Library::default();
     for model in models {

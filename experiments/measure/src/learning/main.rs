@@ -25,8 +25,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 const PARTS: [&str; 5] = ["modelling", "curves", "many", "recorded", "judge"];
-/// Number of learned objects, as in the paper, and maximum number known at once.
+/// Number of learned objects, as in the paper.
 const OBJECTS: usize = 10;
+/// Maximum number of objects known at once.
 const MANY: usize = 50;
 /// Number of scenes for the curves and for many models.
 const SCENES: usize = 36;

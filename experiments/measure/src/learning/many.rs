@@ -24,18 +24,22 @@ const TIMED: usize = 5;
 /// Scores over all scenes.
 #[derive(Default)]
 struct Said {
-    /// Known objects: correct name and pose, correct name at a wrong pose, confused with another, not named.
+    /// Number of known objects with the correct name and pose.
     right: usize,
+    /// Number of known objects with the correct name at a wrong pose.
     askew: usize,
+    /// Number of known objects confused with another.
     other: usize,
+    /// Number of known objects that were not named.
     silent: usize,
-    /// Unknown objects: mistaken for a known one, not named.
+    /// Numbers of unknown objects that were mistaken for a known one, and that were not named.
     strangers: (usize, usize),
-    /// Answers where no object stands.
+    /// Number of answers where no object stands.
     nowhere: usize,
 }
 
-/// Prints and plots; `known` limits the number of learned objects, `scenes` that of scenes.
+/// Prints and plots the results; `known` limits the number of learned objects, `scenes` the number of
+/// scenes.
 pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<Vec<Claim>, String> {
     page.heading("Many models known at once");
     let mut draws = Draws(seed ^ 0x3a27);
@@ -182,7 +186,7 @@ fn learn_all(
     Ok((models, all))
 }
 
-/// Index of the object in the scene at the pose of an answer.
+/// Index of the object in the scene at the pose of an answer; `None` if no object stands there.
 fn thing_at(scene: &Scene, all: &[Body], found: &Recognised) -> Option<usize> {
     let away = |k: usize| {
         let pose = scene.things[k].1;

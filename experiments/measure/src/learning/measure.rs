@@ -7,9 +7,9 @@ use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::register::{Method, Prepared, RegisterOptions, align};
 use descry_perception::{Cloud, Neighbours};
 
-/// Maximum distance of a measured point from a visible true point, metres, and of a learned point from an
-/// explained true point, metres.
+/// Maximum distance of a measured point from a visible true point, metres.
 const VISIBLE_M: f32 = 0.01;
+/// Maximum distance of a learned point from an explained true point, metres, as in the paper.
 const EXPLAINED_M: f32 = 0.02;
 /// A stricter distance than the paper's, metres.
 const STRICT_M: f32 = 0.006;
@@ -28,7 +28,8 @@ pub struct Score {
     pub looks: usize,
 }
 
-/// Shares of `truth` within `radius_m` of `found`, and of `found` within that of `truth`.
+/// Recall and precision: shares of `truth` within `radius_m` of `found`, and of `found` within
+/// `radius_m` of `truth`.
 fn recall_precision(truth: &Cloud, found: &Cloud, radius_m: f32) -> (f64, f64) {
     let share = |of: &Cloud, within: &Neighbours| {
         let near = of.points.iter().filter(|p| within.nearest(p, radius_m).is_some()).count();
@@ -117,10 +118,11 @@ fn pose_error(run: &Run, used: &[usize]) -> (f64, f64) {
     (metres, turns)
 }
 
-/// Minimum gap along the normal between two layers of a doubled wall, metres; maximum offset across the
-/// normal, and search radius.
+/// Minimum gap along the normal between two layers of a doubled wall, metres.
 const GAP_M: f32 = 0.005;
+/// Maximum offset of a layer's point across the normal, metres.
 const ASIDE_M: f32 = 0.004;
+/// Search radius for the layers, metres.
 const DEEP_M: f32 = 0.03;
 
 /// Mean distance of a model's points from the true surface and its 95th percentile, metres, and the share of
@@ -167,7 +169,7 @@ pub fn spread(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
 }
 
-/// The median, the upper one of two.
+/// Median; the upper of the two middle values, NaN without values.
 pub fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

@@ -6,11 +6,11 @@ use crate::page::{Page, PageTable};
 use crate::plot::{Slice, slices};
 use crate::runs::{Run, RunOptions, Way, modelled, run, truth};
 
-/// Pose noise of a keyframe: metres and degrees.
+/// Pose noise of the keyframes: name, metres and degrees.
 const NOISES: [(&str, f64, f64); 3] =
     [("exact poses", 0.0, 0.0), ("0.5 cm, 0.5°", 0.005, 0.5), ("1 cm, 1°", 0.01, 1.0)];
 
-/// Setting of the runs in a row.
+/// Setting of the runs in a row of the table.
 #[derive(Clone, Copy)]
 struct Place {
     name: &'static str,
@@ -24,13 +24,14 @@ const PLACES: [Place; 3] = [
     Place { name: "controlled, another thing touches it", controlled: true, touching: true },
 ];
 
-/// Results of the runs in a row.
+/// Results of the runs in a row of the table.
 #[derive(Default)]
 struct Row {
     scores: Vec<Score>,
     seconds: Vec<f64>,
     failed: Vec<String>,
-    /// Results by modelling method: distances and share of doubled surface.
+    /// Results by modelling method: mean distance from the true surface and its 95th percentile, metres,
+    /// and share of doubled surface.
     ways: [Vec<(f64, f64, f64)>; WAYS.len()],
 }
 

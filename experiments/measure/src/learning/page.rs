@@ -47,7 +47,7 @@ impl Page {
         Page { dir: dir.to_owned(), body: String::new() }
     }
 
-    /// Path of a file of the page.
+    /// Path of a file in the page's folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.dir.join(name)
     }
@@ -76,7 +76,7 @@ impl Page {
         self.body.push_str("</table>\n");
     }
 
-    /// Adds a picture from a file of the page.
+    /// Adds a picture from a file in the page's folder, with a caption.
     pub fn figure(&mut self, name: &str, words: &str) {
         println!("\n{name}: {words}");
         let _ = writeln!(

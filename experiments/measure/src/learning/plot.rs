@@ -101,7 +101,7 @@ fn draw(
     }
 }
 
-/// A line of a panel: points (coverage, f-score), joined if there are several.
+/// Line of a panel: points (x, y) from 0 to 1, joined if there are several.
 pub struct Line {
     pub dashed: bool,
     pub colour: &'static str,

@@ -74,7 +74,7 @@ fn visit(
     (views, truths)
 }
 
-/// Carries out a run; the error is the reason for learning nothing.
+/// Carries out a run; the error is the reason why nothing was learned.
 pub fn run(body: &Body, beside: &Body, options: RunOptions) -> Result<Run, String> {
     let mut draws = Draws(options.seed ^ 0xb0d1);
     let mut room = Room::new(RoomOptions { controlled: options.controlled, seed: options.seed });
@@ -141,7 +141,7 @@ pub struct Way {
     pub name: &'static str,
 }
 
-/// The model of a run by another method.
+/// Model of a run's views by another modelling method.
 pub fn modelled(run: &Run, way: &Way) -> Result<LearnedModel, LearningError> {
     let keyframes: &[Keyframe] = if way.registered { &run.keyframes } else { &[] };
     let options = LearnOptions { smooth: way.smooth, ..LearnOptions::default() };

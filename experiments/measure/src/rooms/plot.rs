@@ -23,7 +23,7 @@ impl Sheet {
         Sheet { low, high, scale, text: String::new() }
     }
 
-    /// A sheet around points.
+    /// Sheet around points, with a margin.
     pub fn around(places: impl Iterator<Item = Point2<f64>>, scale: f64) -> Sheet {
         let (low, high) = places.fold(
             (Point2::new(f64::INFINITY, f64::INFINITY), Point2::new(f64::NEG_INFINITY, f64::NEG_INFINITY)),
@@ -33,7 +33,7 @@ impl Sheet {
         Sheet::new(low - margin, high + margin, scale)
     }
 
-    /// Enlarges the margin.
+    /// Enlarges the margin by `by_m` metres.
     pub fn grown(mut self, by_m: f64) -> Sheet {
         let by = descry_perception::nalgebra::Vector2::repeat(by_m);
         (self.low, self.high) = (self.low - by, self.high + by);

@@ -36,7 +36,7 @@ fn mean_and_most(values: &mut [f64]) -> (f64, f64) {
     (values.iter().sum::<f64>() / values.len() as f64, values[at.min(values.len() - 1)])
 }
 
-/// The fits of a drive's steps.
+/// Relative pose fits between successive stations of a drive.
 pub fn steps(stations: &[Station], rectify: &RectifyOptions) -> Result<Vec<PairFit>, String> {
     rectify_drive(stations, rectify).map_err(|e| e.to_string())
 }

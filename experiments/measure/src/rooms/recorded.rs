@@ -28,8 +28,8 @@ fn read(path: &Path) -> Result<Vec<u8>, String> {
     std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Points moved so that the floor is at z = 0, with their viewpoints; the largest plane across the given
-/// direction is the floor.
+/// Pose that moves the floor to z = 0, and the viewpoints moved by that pose; the floor is the largest
+/// plane across `up` below the first viewpoint. `None` if no plane is found.
 fn floored(
     cloud: &Cloud,
     up: Vector3<f64>,
@@ -180,7 +180,7 @@ fn by_plans(first: &Cloud, second: &Cloud) -> Result<Isometry2<f64>, String> {
     Ok(found)
 }
 
-/// Refines that pose with all points.
+/// Refines the pose `plan` with all points.
 fn by_all_points(first: &Cloud, second: &Cloud, plan: &Isometry2<f64>) -> Result<Isometry3<f64>, String> {
     let before = Instant::now();
     let thin = |cloud: &Cloud| voxel::downsample(cloud, 0.05).map_err(|e| e.to_string());

@@ -90,7 +90,7 @@ fn after_each(seed: u64, policy: Policy, known: &[KnownShape]) -> [Sum; MOST] {
     sums
 }
 
-/// Bearing of the next scan.
+/// Bearing of the next scan, radians.
 pub fn next_bearing(
     policy: Policy,
     bearing: f64,

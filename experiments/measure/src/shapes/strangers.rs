@@ -10,7 +10,7 @@ use descry_perception::laser::{
 };
 use std::f64::consts::TAU;
 
-/// Number of objects of either sort.
+/// Number of known objects, and of unknown ones.
 const THINGS: usize = 100;
 /// Thresholds of the fit, metres; the middle one is the default of [`RecogniseOptions`].
 const SAME_M: [f64; 3] = [0.005, 0.0025, 0.002];

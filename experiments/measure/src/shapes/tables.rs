@@ -19,7 +19,7 @@ pub fn mean_and_spread(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (values.len() as f64 - 1.0).max(1.0)).sqrt())
 }
 
-/// Fig. 5, by every method.
+/// Prints the alignment errors of Fig. 5, by every method.
 pub fn alignment(seed: u64) {
     println!(
         "Fig. 5: 25 models; BV (m²) mean and greatest, longest exterior error (cm); the paper: under 1 cm after"
@@ -45,7 +45,7 @@ pub fn alignment(seed: u64) {
     }
 }
 
-/// Fig. 7, and recognition by features alone.
+/// Prints Fig. 7, and recognition by features alone.
 pub fn features(learnt: &[Alignment]) {
     println!("\nFig. 7: area (cm²) and perimeter (cm) of hulls, spreads; [the paper]");
     let all: Vec<_> = learnt.iter().map(|a| a.model.features()).collect();
@@ -83,7 +83,7 @@ pub fn features(learnt: &[Alignment]) {
     println!("clusters without names: {}", told.join("; "));
 }
 
-/// Fig. 8, and the threshold that separates all objects.
+/// Prints Fig. 8, and the threshold that separates all objects.
 pub fn f_c(learnt: &[Alignment]) {
     println!("\nFig. 8: f_C (m²), least to greatest over all pairs of instances; [the paper]");
     let (mut same, mut other) = ((0.0_f64, 0.0_f64), (f64::INFINITY, f64::INFINITY));
@@ -115,8 +115,8 @@ pub fn f_c(learnt: &[Alignment]) {
     );
 }
 
-/// Results for other outlines of the recycle-bin, whose published area and perimeter leave one parameter
-/// open.
+/// Prints results for other outlines of the recycle-bin, whose published area and perimeter leave one
+/// parameter open.
 pub fn recycle_bins(seed: u64, learnt: &[Alignment]) {
     println!(
         "\nrecycle-bin and garbage-can, f_C (m²) [0.013-0.039], for other outlines with the same hull area and perimeter"
@@ -140,7 +140,7 @@ pub fn recycle_bins(seed: u64, learnt: &[Alignment]) {
     }
 }
 
-/// Fig. 9, and the same for every scan of every instance on every other.
+/// Prints Fig. 9, and the same for every scan of every instance on every other instance.
 pub fn localisation(seed: u64, learnt: &[Alignment]) {
     println!(
         "\nFig. 9: a scan moved by 0.1 m, 0.1 m, 0.1 rad and localised: position (m), angle (rad), BV (m²), longest exterior (m); [the paper]"
@@ -186,8 +186,8 @@ pub fn localisation(seed: u64, learnt: &[Alignment]) {
     );
 }
 
-/// Recognition and localisation of single scans without an initial pose: each scan against all models but its
-/// own.
+/// Prints recognition and localisation of single scans without an initial pose: each scan against all
+/// models but its own.
 pub fn single_scans(learnt: &[Alignment]) {
     let known = named(learnt);
     let (mut scans, mut right, mut among, mut wrong, mut missed, mut off_m) = (0, 0, 0, 0, 0, Vec::new());

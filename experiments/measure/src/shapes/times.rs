@@ -10,8 +10,9 @@ use descry_perception::laser::{
 };
 use std::time::Instant;
 
-/// Number of repetitions, and the longest first run that is repeated at all, milliseconds.
+/// Maximum number of repetitions.
 const REPETITIONS: usize = 5;
+/// Duration beyond which a run is not repeated, milliseconds.
 const LONG_MS: f64 = 500.0;
 
 /// Minimum time of several repetitions, milliseconds.

@@ -61,8 +61,9 @@ pub fn print(seed: u64, learnt: &[Alignment]) {
     legs(seed, &chair[0]);
 }
 
-/// Number of observations of a chair's legs with wrong points, and maximum error of a correct one, metres.
+/// Number of observations of a chair's legs with wrong points.
 const LEGS: usize = 40;
+/// Maximum error of a correct alignment, metres.
 const NEAR_M: f64 = 0.03;
 
 /// Prints results for a chair's legs with a fifth of the readings wrongly subtracted, which often removes all

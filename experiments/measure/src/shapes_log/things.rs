@@ -7,8 +7,9 @@ use descry_perception::nalgebra::{Point2, Point3, Vector2};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Cell size for counting readings, metres, and minimum number of readings in a cell.
+/// Cell size for counting readings, metres.
 const CELL_M: f64 = 0.05;
+/// Minimum number of readings in a cell that counts as filled.
 const LEAST_IN_CELL: usize = 2;
 /// Distance that separates two objects, metres.
 const APART_M: f32 = 0.3;
@@ -18,9 +19,11 @@ const WIDTH_M: (f64, f64) = (0.15, 1.2);
 const AROUND_M: f64 = 0.2;
 /// Maximum distance of scans from an object, metres.
 const NEAR_M: f64 = 4.0;
-/// Number of sectors by which scans are sorted; minimum number of sectors with a scan, and with two.
+/// Number of sectors around an object into which scans are sorted.
 const SECTORS: usize = 24;
+/// Minimum number of sectors with a scan.
 const LEAST_SECTORS: usize = 5;
+/// Minimum number of sectors with a second scan.
 const LEAST_TWICE: usize = 4;
 
 /// Position and radius of an object.
@@ -52,7 +55,7 @@ pub fn find(scans: &[Scan]) -> Result<Vec<Thing>, ObserveError> {
     Ok(euclidean(&flat, APART_M, 4)?.into_iter().filter_map(of).collect())
 }
 
-/// Two disjoint sets of scans of an object; none if it was not scanned from enough sides.
+/// Two disjoint sets of scans of an object; `None` if it was not scanned from enough sides.
 pub fn two_sets(scans: &[Scan], thing: &Thing) -> Result<Option<[Vec<PosedScan>; 2]>, ObserveError> {
     let far_m = |scan: &Scan| (scan.map_from_laser.translation.vector - thing.middle.coords).norm();
     let near: Vec<Scan> = scans.iter().filter(|s| far_m(s) < NEAR_M).cloned().collect();

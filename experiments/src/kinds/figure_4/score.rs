@@ -20,7 +20,7 @@ const SAME_PLACE_M: f64 = 0.05;
 /// Minimum number of pixels on a handle for it to count as seen: 2 by 2 cm at 1.4 m with a Kinect.
 const HANDLE_PIXELS: usize = 60;
 
-/// A row for each mode, number of views and recogniser.
+/// Rows of measurements, one for each mode, number of views and recogniser.
 pub(super) fn rows(experiment: &Figure4, taken: &Taken) -> Vec<Row> {
     let mut rows = Vec::new();
     for k in 1..=taken.views.len() {
@@ -113,7 +113,8 @@ fn score(
     }))
 }
 
-/// Assigns each percept to a true object, nearest pairs first, each object once.
+/// Index of the true object of each percept, assigned nearest pairs first, each object once; `None` for
+/// a percept without one.
 fn owners(
     percepts: &[Percept],
     objects: &[TrueObject],

@@ -79,7 +79,7 @@ pub(super) fn summarise(experiment: &Figure4, finished: &[Numbered<'_>]) -> Summ
     summary
 }
 
-/// The cell of a recogniser, a mode and a number of views.
+/// Lookup of the cell of a recogniser, a mode and a number of views.
 type OfSet<'a> = dyn Fn(&str, &str, usize) -> Cell + 'a;
 
 fn numbers(curve: &[Cell]) -> Value {

@@ -69,12 +69,12 @@ pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Live
 pub(super) struct Scored {
     /// True if the verdict is right: achieved and said so, or impossible and said so.
     pub right: bool,
-    /// True if a yes is false.
+    /// True if the verdict is a yes that is false.
     pub false_yes: bool,
     /// True if the target is said to be absent (or the condition false), wrongly.
     pub false_not_there: bool,
-    /// Maximum distance of the objects from their stated positions, metres; none unless all are within the
-    /// tolerance.
+    /// Maximum distance of the objects from their stated positions, metres; `None` unless all are within
+    /// the tolerance.
     pub error_m: Option<f64>,
 }
 
@@ -125,7 +125,8 @@ fn named(report: &Report) -> Vec<Place> {
     }
 }
 
-/// Distance of an object from a position along the floor, metres; none if it stands on another surface.
+/// Distance of an object from a position along the floor, metres; `None` if the object stands on another
+/// surface.
 fn distance_m((at, on): &Place, object: &TrueObject) -> Option<f64> {
     (object.surface == *on).then(|| (object.centre_m.x - at[0]).hypot(object.centre_m.y - at[1]))
 }

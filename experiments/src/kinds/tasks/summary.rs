@@ -33,7 +33,7 @@ struct Run<'a> {
     case: &'a str,
     policy: &'a str,
     group: u64,
-    /// Measurements; none if the run ended with an error.
+    /// Measurements; `None` if the run ended with an error.
     row: Option<&'a Row>,
 }
 
@@ -154,7 +154,7 @@ pub(super) fn summarise(experiment: &Tasks, finished: &[Numbered<'_>]) -> Summar
     Summary { values: values.as_object().cloned().unwrap_or_default(), sections }
 }
 
-/// Share of runs with a completed execution of each action; none if no goal names stages.
+/// Share of runs with a completed execution of each action; `None` if no goal names stages.
 fn stages(experiment: &Tasks, runs: &[Run<'_>]) -> Option<Table> {
     let text = &experiment.text;
     let head = ["goal", "policy", "stage", "runs", "carried out"];

@@ -233,7 +233,7 @@ fn comparisons(experiment: &WhereToLook, runs: &[Run<'_>]) -> (Table, Value) {
     (table, Value::Object(values))
 }
 
-/// The figures of a policy in a part.
+/// Lookup of the statistics of a policy in a part of the runs.
 type Of<'a> = dyn Fn(&str, &dyn Fn(&Run<'_>) -> bool) -> Figures + 'a;
 
 fn plots(experiment: &WhereToLook, of: &Of<'_>) -> Vec<Section> {

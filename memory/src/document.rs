@@ -83,7 +83,7 @@ pub enum Form {
 /// Description of a blob, without its bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlobInfo {
-    /// Name within the record.
+    /// Name of the blob, unique within the record.
     pub name: String,
     /// Form of the content.
     pub form: Form,
@@ -137,7 +137,7 @@ pub struct Document {
 /// A blob to be recorded.
 #[derive(Clone, Debug)]
 pub struct Blob<'a> {
-    /// Name within the record.
+    /// Name of the blob, unique within the record.
     pub name: String,
     /// Form of the content.
     pub form: Form,

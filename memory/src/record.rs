@@ -88,9 +88,9 @@ pub enum Image<'a> {
     },
     /// Plain pixels, row by row.
     Raw {
-        /// Columns.
+        /// Number of columns.
         width: u32,
-        /// Rows.
+        /// Number of rows.
         height: u32,
         /// Encoding, as viewers name it: `rgb8`, `mono8`, `16UC1` (depth in millimetres), `32FC1` (depth in
         /// metres).

@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Progress of a run that repeats its record, by kind of document.
 pub(crate) struct Retrace {
-    /// Name of the robot; "" where robots have no names.
+    /// Name of the robot; "" if the store's robots have no names.
     robot: String,
     /// Newest stamp in the record when it was opened, nanoseconds.
     pub newest_ns: i64,

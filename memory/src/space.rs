@@ -160,7 +160,8 @@ impl Space {
         }
     }
 
-    /// Viewpoints of the integrated views, world frame, metres; nearer than `SAME_PLACE_M` they count once.
+    /// Viewpoints of the integrated views, world frame, metres; those nearer to each other than
+    /// `SAME_PLACE_M` count once.
     pub fn seen_from(&self) -> &[Point3<f64>] {
         &self.seen_from
     }

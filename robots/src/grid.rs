@@ -10,9 +10,9 @@ pub struct OccupancyGrid {
     pub resolution_m: f64,
     /// Outer corner of cell (0, 0), metres.
     pub origin_m: Point2<f64>,
-    /// Cells along x.
+    /// Number of cells along x.
     pub width: usize,
-    /// Cells along y.
+    /// Number of cells along y.
     pub height: usize,
     /// Row by row (x fastest); true for occupied cells.
     pub occupied: Vec<bool>,

@@ -245,7 +245,7 @@ impl LocalStore {
         self.index().seal(number, bytes)
     }
 
-    /// Reads and verifies `length` bytes of a record at a spot.
+    /// Reads `length` bytes of a record at an offset, and verifies their checksum.
     fn read(&self, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
         let path = segment_path(&self.dir, place.segment);
         read_at(&*self.file(place, &path)?, &path, place, spot, length)
@@ -479,7 +479,7 @@ impl LocalStore {
     }
 }
 
-/// Reads and verifies `length` bytes of a segment at a spot.
+/// Reads `length` bytes of a segment at an offset, and verifies their checksum.
 fn read_at(file: &File, path: &Path, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
     let damaged = |what: String| Error::Damaged {
         place: path.to_owned(),

@@ -13,7 +13,8 @@ const PLACES: usize = 4;
 const AWAY_M: [f64; 3] = [1.4, 1.7, 2.0];
 /// Number of directions of candidate viewpoints.
 const DIRECTIONS: usize = 8;
-/// Number of steps in which sample points divide each triangle between an edge of a surface and its centre.
+/// Number of steps along an edge of a surface, and from the edge to the surface's centre, between which
+/// sample points lie.
 const GRID: usize = 12;
 /// Depth beyond a point of the surface, metres, from which a view counts as looking past the surface; the
 /// uncertainty of the camera pose is added.

@@ -91,9 +91,9 @@ fn default_clearance_m() -> f64 {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Camera {
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     width: usize,
-    /// Rows.
+    /// Number of rows.
     height: usize,
     /// Focal length along x, pixels.
     fx: f64,
@@ -150,7 +150,7 @@ struct Laser {
     first_rad: f64,
     /// Angle from one reading to the next, radians.
     step_rad: f64,
-    /// Readings in a sweep.
+    /// Number of readings in a sweep.
     readings: usize,
     /// Maximum range, metres.
     reach_m: f64,
@@ -186,9 +186,9 @@ struct Map {
     resolution_m: f64,
     /// Outer corner of cell (0, 0), map frame, metres.
     origin_m: Point2<f64>,
-    /// Cells along x.
+    /// Number of cells along x.
     width: usize,
-    /// Cells along y.
+    /// Number of cells along y.
     height: usize,
 }
 

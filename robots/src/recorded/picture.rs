@@ -11,9 +11,9 @@ const MOST_IMAGE_BYTES: u64 = 256 << 20;
 /// A depth image in the units of its file, row by row; NaN without a return.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawDepth {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
     /// Depth of each pixel along the optical axis.
     pub units: Vec<f32>,

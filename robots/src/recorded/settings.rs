@@ -20,11 +20,11 @@ pub struct Settings {
     pub folder: Option<String>,
     /// Units of a depth image in a metre.
     pub depth_scale: f64,
-    /// Name of the first station.
+    /// Name of the station where the body starts; the first frame if left out.
     pub start: Option<String>,
     /// Upward direction in the world of the poses.
     pub up: Option<[f64; 3]>,
-    /// True if pixels of colour and depth are the same.
+    /// True if colour and depth image show the same point at the same pixel.
     pub registered: bool,
     /// Standard deviation of the positions along each axis, metres.
     pub pose_sigma_m: f64,

@@ -43,7 +43,7 @@ pub struct Stated {
     pub reading: Conventions,
     /// True if depths are 16-bit integers.
     pub whole: bool,
-    /// True if pixels of colour and depth are the same.
+    /// True if colour and depth image show the same point at the same pixel.
     pub registered: bool,
     /// Upward direction in the world of the poses, if the layout defines one.
     pub up: Option<[f64; 3]>,

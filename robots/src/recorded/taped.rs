@@ -52,7 +52,7 @@ struct State {
     /// Point in the map at which the head was last directed; `None` once another request may have moved the
     /// body.
     gaze: Option<Point3<f64>>,
-    /// True once the pose of the live body was compared with the end of the tape, or need not be.
+    /// True once the pose of the live body was compared with the end of the tape, or needs no comparison.
     met: bool,
     /// Time by which the run's clock is ahead of the live body's, nanoseconds.
     ahead_ns: Stamp,

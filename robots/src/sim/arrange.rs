@@ -288,7 +288,8 @@ fn choose_surfaces<'a>(spec: &'a SceneSpec, rng: &mut ChaCha8Rng) -> Option<Vec<
     Some(chosen)
 }
 
-/// Draws one of the possible surfaces of an object by their weights, except `taken`; `None` if there is none.
+/// Draws one of the possible surfaces of an object by their weights, except `taken`; `None` if no surface is
+/// possible.
 fn choose_surface<'a>(
     spec: &'a SceneSpec,
     o: &ObjectSpec,

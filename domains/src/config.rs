@@ -192,7 +192,7 @@ pub enum Steps {
     /// No skill is named.
     #[default]
     Unsaid,
-    /// One skill.
+    /// Single skill, with the action's variables as arguments.
     One(String),
     /// Several skills, carried out one after the other.
     Several(Vec<String>),

@@ -189,7 +189,7 @@ impl Situation {
         self.errs_by.map_or(*p, |map_from_localised| map_from_localised.inverse() * p)
     }
 
-    /// Looks (candidate, surface) that the plan takes before a call, from the `observed` facts that the
+    /// Views (candidate, surface) that the plan takes before a call, from the `observed` facts that the
     /// call reads.
     pub(crate) fn planned_looks(&self, call: &Call) -> Vec<(usize, usize)> {
         let look = |r: &descry_planner::Reading| {

@@ -348,7 +348,7 @@ impl<'a> World<'a> {
         self.is_unasked = false;
     }
 
-    /// True if the steps are taken regardless of expected gain: a policy chooses single looks and
+    /// True if the steps are taken regardless of expected gain: a policy chooses single views and
     /// does not claim that they suffice.
     pub fn takes_steps_unasked(&self) -> bool {
         self.is_unasked

@@ -22,7 +22,7 @@ impl Source {
     /// Reads an experiment file.
     ///
     /// # Errors
-    /// [`ExperimentError::File`] if it is missing or not a text.
+    /// [`ExperimentError::File`] if the file is missing or not a text.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
         let text = descry_robots::input::read_text(path).map_err(|e| {
             ExperimentError::file(

@@ -54,7 +54,7 @@ pub struct Pair {
     pub b: f64,
 }
 
-/// A share `hits / n` with Wilson's score interval; none for `n = 0`.
+/// A share `hits / n` with Wilson's score interval; `None` for `n = 0`.
 pub fn rate(hits: usize, n: usize) -> Option<Estimate> {
     if n == 0 {
         return None;
@@ -67,13 +67,13 @@ pub fn rate(hits: usize, n: usize) -> Option<Estimate> {
     Some(Estimate { value: p, interval: Some([(middle - half).max(0.0), (middle + half).min(1.0)]), n })
 }
 
-/// Mean with its bootstrap interval; none without observations.
+/// Mean with its bootstrap interval; `None` without observations.
 pub fn mean(observations: &[Observation]) -> Option<Estimate> {
     let sums = sums(observations.iter().map(|o| (o.group, [o.value, 1.0])));
     estimate(observations.len(), &sums, |[total, n]| total / n)
 }
 
-/// The ratio of two sums over the same observations, such as hits by attempts; none if the second sum is zero.
+/// The ratio of two sums over the same observations, such as hits by attempts; `None` if the second sum is zero.
 pub fn ratio(pairs: &[Pair]) -> Option<Estimate> {
     let sums = sums(pairs.iter().map(|p| (p.group, [p.a, p.b])));
     let n = pairs.iter().map(|p| p.b).sum::<f64>() as usize;
@@ -97,14 +97,14 @@ pub fn difference(pairs: &[Pair]) -> Option<Estimate> {
     estimate(pairs.len(), &sums, |[total, n]| total / n)
 }
 
-/// Share of `b` that `a` saves, `1 - mean(a) / mean(b)`; none if the mean of `b` is zero.
+/// Share of `b` that `a` saves, `1 - mean(a) / mean(b)`; `None` if the mean of `b` is zero.
 pub fn saving(pairs: &[Pair]) -> Option<Estimate> {
     let sums = sums(pairs.iter().map(|p| (p.group, [p.a, p.b])));
     estimate(pairs.len(), &sums, |[a, b]| 1.0 - a / b)
 }
 
 /// Two-sided p-value of the sign-flip permutation test (Fisher's randomisation test) for a mean of `a - b` of
-/// 0. The pairs of a group change their signs together; none without pairs.
+/// 0. The pairs of a group change their signs together; `None` without pairs.
 pub fn sign_flip(pairs: &[Pair]) -> Option<f64> {
     let sums: Vec<f64> =
         sums(pairs.iter().map(|p| (p.group, [p.a - p.b, 0.0]))).iter().map(|[sum, _]| *sum).collect();
@@ -176,7 +176,7 @@ fn estimate(n: usize, groups: &[[f64; 2]], statistic: impl Fn([f64; 2]) -> f64) 
 pub type Forecast = (f64, bool);
 
 /// Brier score (1950), the mean squared difference between stated probabilities and outcomes: 0 is perfect, a
-/// constant one half gives 0.25; none without forecasts.
+/// constant one half gives 0.25; `None` without forecasts.
 pub fn brier(forecasts: &[Forecast]) -> Option<f64> {
     let squared = |&(p, happened): &Forecast| (p - f64::from(happened)).powi(2);
     (!forecasts.is_empty()).then(|| forecasts.iter().map(squared).sum::<f64>() / forecasts.len() as f64)

@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 /// Width of a terminal that does not report one, columns.
 const USUAL_WIDTH: usize = 80;
 
-/// Width of the terminal behind a stream, columns; none without a terminal.
+/// Width of the terminal behind a stream, columns; `None` without a terminal.
 pub fn width(stream: &(impl IsTerminal + std::os::fd::AsFd)) -> Option<usize> {
     let known = || terminal_size::terminal_size_of(stream).map(|(width, _)| usize::from(width.0));
     stream.is_terminal().then(|| known().filter(|width| *width > 0).unwrap_or(USUAL_WIDTH))
@@ -35,7 +35,7 @@ fn colour(text: &str) -> usize {
     if numbers[end..].starts_with('m') { 2 + end + 1 } else { 0 }
 }
 
-/// Wraps a text to a width; none: unchanged. Continuation lines are indented to the second column.
+/// Wraps a text to a width; `None`: unchanged. Continuation lines are indented to the second column.
 pub fn fitted(text: &str, width: Option<usize>) -> String {
     let Some(width) = width else { return text.to_string() };
     text.lines().map(|line| folded(line, width)).collect::<Vec<_>>().join("\n")

@@ -145,7 +145,7 @@ impl Goals {
     /// Claims a folder for this process, and reads its journal.
     ///
     /// # Errors
-    /// [`CommandError::BadInput`] if another server has the folder or it cannot be written;
+    /// [`CommandError::BadInput`] if another server has the folder or the folder cannot be written;
     /// [`CommandError::Broken`] if the journal is damaged or cannot be read.
     pub(crate) fn of(folder: &Path) -> Result<Self, CommandError> {
         let lock = locked(folder)?;

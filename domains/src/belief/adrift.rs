@@ -46,8 +46,8 @@ pub(crate) fn chance_off(s: &Situation, track: &Track) -> f64 {
     if chance < NEGLIGIBLE || s.unseen_ends(on).is_empty() { 0.0 } else { chance }
 }
 
-/// Share of a surface's unseen locating edges that a look (candidate and surface) shows beyond the
-/// earlier looks, 0 to 1.
+/// Share of a surface's unseen locating edges that a view (candidate and surface) shows beyond the
+/// earlier views, 0 to 1.
 pub(crate) fn share_shown(s: &Situation, look: (usize, usize), before: &[(usize, usize)]) -> f64 {
     let ends = s.unseen_ends(look.1);
     let told = |(from, on): (usize, usize), end| s.would_settle(from, on, end, None);

@@ -173,8 +173,8 @@ impl Doubt {
         }
     }
 
-    /// Share of the doubt, 0 to 1, that a look (candidate, surface) would settle beyond the earlier
-    /// steps of the plan. Doubt that no look can settle is left out of account; zero if what looks can
+    /// Share of the doubt, 0 to 1, that a view (candidate, surface) would settle beyond the earlier
+    /// steps of the plan. Doubt that no view can settle is left out of account; zero if what views can
     /// settle is negligible.
     pub fn share_settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
         if self.anywhere {
@@ -194,15 +194,15 @@ impl Doubt {
         settled / total.as_told
     }
 
-    /// Probability mass that a look would settle beyond the earlier looks of the plan, as far as any
-    /// possible look can settle it.
+    /// Probability mass that a view would settle beyond the earlier views of the plan, as far as any
+    /// possible view can settle it.
     pub fn settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
         let all = if self.anywhere { 1.0 } else { self.within_reach(situation, before.moved).weight };
         self.share_settled(situation, look, before) * all.min(1.0)
     }
 
-    /// Total weight of the hypotheses that at least one reachable look could settle, once the obstacle
-    /// `moved` is out of the way. Looks already taken count only if an obstacle is moved.
+    /// Total weight of the hypotheses that at least one reachable view could settle, once the obstacle
+    /// `moved` is out of the way. Views already taken count only if an obstacle is moved.
     fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> Reach {
         *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
             let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);
@@ -221,12 +221,12 @@ impl Doubt {
         })
     }
 
-    /// True if looks alone, without moving an obstacle, can settle enough doubt to be worthwhile.
+    /// True if views alone, without moving an obstacle, can settle enough doubt to be worthwhile.
     pub fn can_be_settled(&self, situation: &Situation) -> bool {
         self.anywhere || self.is_worth_it(situation, self.within_reach(situation, None).weight, None)
     }
 
-    /// True if looks that settle this weight are worthwhile: by themselves, or because they would allow
+    /// True if views that settle this weight are worthwhile: by themselves, or because they would allow
     /// the claim that nothing is hidden.
     fn is_worth_it(&self, situation: &Situation, weight: f64, moved: Option<usize>) -> bool {
         let t = &situation.thresholds;
@@ -234,7 +234,7 @@ impl Doubt {
         weight >= negligible(situation, moved) || (self.hidden > most && self.hidden - weight <= most)
     }
 
-    /// True if moving an obstacle would let looks settle enough doubt that no look can settle now.
+    /// True if moving an obstacle would let views settle enough doubt that no view can settle now.
     pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
         let [before, after] = [None, Some(what)].map(|moved| self.shown(situation, moved));
         let only_after = |n: &usize| after[*n] && !before[*n];
@@ -243,7 +243,7 @@ impl Doubt {
         uncovered >= negligible(situation, Some(what))
     }
 
-    /// Maximum weight that one reachable, unused look at a surface would settle.
+    /// Maximum weight that one reachable, unused view of a surface would settle.
     pub fn most_settled_on(&self, situation: &Situation, on: usize) -> f64 {
         if self.anywhere {
             return self.hidden;
@@ -256,7 +256,7 @@ impl Doubt {
         self.looks_at(situation, on, &open, None).map(settled).fold(0.0, f64::max)
     }
 
-    /// Probability mass that looks from several viewpoints at a surface settle together.
+    /// Probability mass that views of a surface from several viewpoints settle together.
     pub(crate) fn settled_by(&self, situation: &Situation, from: &[usize], on: usize) -> f64 {
         let Some(part) = self.parts.get(&on) else { return 0.0 };
         let told: Vec<Arc<[f64]>> = from.iter().map(|&from| self.told(situation, (from, on), None)).collect();
@@ -287,7 +287,7 @@ impl Doubt {
         if self.anywhere { self.hidden } else { all.min(1.0) }
     }
 
-    /// Probability of hidden places that no look can show, and the centres of these places.
+    /// Probability of hidden places that no view can show, and the centres of these places.
     pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
         let shown = self.shown(situation, None);
         let hidden = self.hypotheses.iter().zip(shown).filter(|(h, _)| h.facing.is_none());
@@ -295,7 +295,7 @@ impl Doubt {
         (unseeable.iter().map(|h| h.weight).sum(), unseeable.iter().map(|h| h.centre).collect())
     }
 
-    /// For each hypothesis, true if a reachable look settles any of it.
+    /// For each hypothesis, true if a reachable view settles any of it.
     fn shown(&self, situation: &Situation, moved: Option<usize>) -> Vec<bool> {
         let mut shown = vec![false; self.hypotheses.len()];
         for (&on, part) in &self.parts {
@@ -306,7 +306,7 @@ impl Doubt {
         shown
     }
 
-    /// Settled share of each hypothesis on a surface, for every reachable look accepted by `open`.
+    /// Settled share of each hypothesis on a surface, for every reachable view accepted by `open`.
     fn looks_at<'d>(
         &'d self,
         situation: &'d Situation,
@@ -320,8 +320,8 @@ impl Doubt {
             .map(move |look| self.told(situation, look, moved))
     }
 
-    /// Share of each hypothesis of a surface that a look (candidate, surface) settles, in
-    /// hypothesis order; zero if the look does not see the surface.
+    /// Share of each hypothesis of a surface that a view (candidate, surface) settles, in
+    /// hypothesis order; zero if the view does not see the surface.
     fn told(&self, situation: &Situation, (from, on): (usize, usize), moved: Option<usize>) -> Arc<[f64]> {
         let Some(part) = self.parts.get(&on) else { return Arc::default() };
         let Ok(viewer) = situation.viewers(on).binary_search(&from) else {
@@ -415,7 +415,7 @@ impl Doubt {
     }
 }
 
-/// Probability below which doubt is not worth a look; lower for doubt that only moving an obstacle can
+/// Probability below which doubt is not worth a view; lower for doubt that only moving an obstacle can
 /// settle.
 fn negligible(situation: &Situation, moved: Option<usize>) -> f64 {
     if moved.is_some() { situation.thresholds.out_of_sight } else { situation.thresholds.remaining }
@@ -531,14 +531,14 @@ impl Situation {
         self.doubts_kept().on[on].get_or_init(|| Doubt::on(self, on))
     }
 
-    /// True if a look from a candidate at a surface may settle a relevant doubt, after the obstacle
+    /// True if a view of a surface from a candidate may settle a relevant doubt, after the obstacle
     /// `moved` has been moved.
     pub fn worth_a_look(&self, from: usize, on: usize, moved: Option<usize>) -> bool {
         let taken = Taken { looks: &[], moved };
         self.doubts().iter().any(|doubt| doubt.share_settled(self, (from, on), taken) > 0.0)
     }
 
-    /// True if looks would settle enough further doubt once an obstacle is moved.
+    /// True if views would settle enough further doubt once an obstacle is moved.
     pub(crate) fn would_uncover(&self, what: usize) -> bool {
         self.doubts().iter().any(|doubt| doubt.can_be_settled_without(self, what))
     }

@@ -61,7 +61,7 @@ impl Obstacle {
     }
 }
 
-/// Objects that may be pushed aside: all small ones on surfaces. None while a look can settle doubt, or
+/// Objects that may be pushed aside: all small ones on surfaces. None while a view can settle doubt, or
 /// if the body has no arm or no push is left.
 pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
     let alone = situation.doubts().into_iter().any(|doubt| doubt.can_be_settled(situation));
@@ -123,7 +123,7 @@ fn obstructions(situation: &Situation, obstacle: &Obstacle, from: &Point3<f64>, 
 }
 
 impl Situation {
-    /// Objects that may be pushed aside; none while a look can settle doubt.
+    /// Objects that may be pushed aside; none while a view can settle doubt.
     pub fn obstacles(&self) -> &[Obstacle] {
         let obstacles: &Obstacles = self.derived.get(&Obstacles::default);
         obstacles.0.get_or_init(|| all(self))

@@ -43,7 +43,7 @@ impl Situation {
         self.geometry.sight(on).viewers.get_or_init(all)
     }
 
-    /// Looks that show anything, each a candidate index and a surface index, in order.
+    /// Views that show anything, each a candidate index and a surface index, in order.
     pub fn all_looks(&self) -> Vec<(usize, usize)> {
         let surfaces = 0..self.surfaces.len();
         let mut looks: Vec<(usize, usize)> =

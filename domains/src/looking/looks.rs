@@ -1,4 +1,4 @@
-//! Ranking of looks by the doubt that they would settle.
+//! Ranking of views by the doubt that they would settle.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -12,7 +12,7 @@ use crate::situation::{Situation, cells};
 /// Assumed duration of a view, seconds, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
-/// Useful looks (candidate, surface) that fit into the remaining time, by settled doubt per second, best
+/// Useful views (candidate, surface) that fit into the remaining time, by settled doubt per second, best
 /// first.
 pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     // Where all of a kind are wanted, what else is in doubt of each of them is not asked about.
@@ -33,7 +33,7 @@ pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     best_first(worth.map(|(look, settles)| (settles / takes_s(look.0), look)).collect())
 }
 
-/// Useful looks as sequences of drive and view, best first.
+/// Useful views as sequences of drive and view, best first.
 pub(crate) fn look_deeds(s: &Situation) -> Vec<Vec<Deed>> {
     looks(s).into_iter().map(|(from, on)| look(s, from, on).after_drive(s, from)).collect()
 }

@@ -13,7 +13,7 @@ use crate::situation::Situation;
 use crate::{abilities, actions, culprit, origin, words};
 
 impl World<'_> {
-    /// Choice after the planner has hit its state limit: a certainly useful step, or else a look behind
+    /// Choice after the planner has hit its state limit: a certainly useful step, or else a view behind
     /// a shut door.
     ///
     /// # Errors
@@ -38,7 +38,7 @@ impl World<'_> {
         own.map(|fallback| fallback(s))
     }
 
-    /// Choice of a look behind a shut door; [`Choice::Nothing`] if there is none.
+    /// Choice of a view behind a shut door; [`Choice::Nothing`] if there is none.
     fn behind(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         loop {
@@ -102,7 +102,7 @@ impl World<'_> {
         Some(Choice::Towards { task: Box::new(task), then: Plan::default() })
     }
 
-    /// Choice of a look to take before accepting a goal that holds by absence of evidence: the one that
+    /// Choice of a view to take before accepting a goal that holds by absence of evidence: the one that
     /// settles most of the contrary evidence, or else one behind a shut door, while the answer is
     /// unknown.
     ///
@@ -125,7 +125,7 @@ impl World<'_> {
         }
     }
 
-    /// Choice of a look that may still help without a plan, if time is too short or no look promises the
+    /// Choice of a view that may still help without a plan, if time is too short or no view promises the
     /// goal: the one with the highest gain per second that ends in time.
     ///
     /// # Errors

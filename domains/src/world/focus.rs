@@ -17,7 +17,7 @@ use crate::situation::Situation;
 
 /// Maximum number of viewpoints, by stage; smaller maps are planned on as a whole.
 const MOST_VIEWPOINTS: [usize; 2] = [64, 160];
-/// Share of the doubt settleable by a surface's looks that its viewpoints of the second stage
+/// Share of the doubt settleable by a surface's views that its viewpoints of the second stage
 /// cover.
 const COVERED: f64 = 0.98;
 /// Predicates whose facts do not by themselves make a viewpoint relevant.
@@ -101,13 +101,13 @@ fn ranked(s: &Situation, named: &BTreeSet<&str>) -> Vec<(f64, usize)> {
     ranked
 }
 
-/// True if a viewpoint of a surface is useful: reachable, and with a look or a manipulation left.
+/// True if a viewpoint of a surface is useful: reachable, and with a view or a manipulation left.
 fn may_do(s: &Situation, from: usize, on: usize) -> bool {
     let is_work = s.held.is_some() || s.on_surface(on).next().is_some();
     s.can_reach(from) && (is_work || !s.observed.contains(&(from, on)))
 }
 
-/// Viewpoints of a surface that together settle nearly all doubt that looks can settle there.
+/// Viewpoints of a surface that together settle nearly all doubt that views can settle there.
 fn covering(s: &Situation, on: usize) -> Vec<usize> {
     let open: Vec<usize> = s
         .viewers(on)

@@ -17,8 +17,8 @@ const GAP_S: f64 = 0.001;
 const BINDINGS: usize = 64;
 
 impl World<'_> {
-    /// Choice for a policy's look: at once, or by a plan that opens, unlocks or charges what is
-    /// needed first. `None` if no action can take the look, which is then not chosen again.
+    /// Choice for a policy's view: at once, or by a plan that opens, unlocks or charges what is
+    /// needed first. `None` if no action can take the view, which is then not chosen again.
     pub(super) fn head_for(
         &mut self,
         round: &Round,

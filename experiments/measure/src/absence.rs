@@ -1,4 +1,4 @@
-//! Calibration of the stated probability of presence as looks accumulate: `cargo run --release -p
+//! Calibration of the stated probability of presence as views accumulate: `cargo run --release -p
 //! descry-measure --bin absence -- COUNT SEED HOLES [PLOT.svg]`.
 //!
 //! Half of the arrangements contain cup A, nearly hidden from the start; the others lack it. Each is viewed

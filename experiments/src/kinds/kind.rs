@@ -36,7 +36,7 @@ pub trait Kind: Send + Sync {
     /// removed afterwards.
     ///
     /// # Errors
-    /// A message for people; it becomes a row.
+    /// Reason for people why the job failed; the job gets a row with this reason.
     fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String>;
 
     /// Summarises finished jobs, all or those so far, in the order of [`Kind::jobs`].

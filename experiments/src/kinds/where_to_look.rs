@@ -50,7 +50,7 @@ struct Text {
     /// Share of the scenes of each level from which the target is removed.
     #[serde(default)]
     absent_share: f64,
-    /// True if every policy, the oracle too, takes its first look from the start, by which the
+    /// True if every policy, the oracle too, takes its first view from the start, by which the
     /// levels of occlusion are defined.
     #[serde(default)]
     first_look_from_start: bool,

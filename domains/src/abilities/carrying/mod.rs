@@ -108,7 +108,7 @@ pub const ABILITY: Ability = Ability {
     ..Ability::named("carrying", "takes one thing into the hand and puts it down elsewhere")
 };
 
-/// Fallback: the look with the highest gain per second; a held object is first put down where that
+/// Fallback: the view with the highest gain per second; a held object is first put down where that
 /// is quickest.
 fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let Some(track) = held(s) else { return looks::look_deeds(s) };

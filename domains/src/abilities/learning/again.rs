@@ -70,7 +70,7 @@ pub(super) fn forget(mind: &mut Mind) {
     mind.known.states.get_mut::<Glances>().by_time.clear();
 }
 
-/// Takes the recognition results out of the cache; none if the scene was disturbed since they were
+/// Takes the recognition results out of the cache; no results if the scene was disturbed since they were
 /// computed.
 fn glances(mind: &mut Mind) -> BTreeMap<i64, Arc<Glance>> {
     let disturbed = mind.disturbed;

@@ -1,4 +1,4 @@
-//! *surveying*: a body without a map builds one, look by look (Viejo and Cazorla, *Construcción de
+//! *surveying*: a body without a map builds one, view by view (Viejo and Cazorla, *Construcción de
 //! mapas 3D y extracción de primitivas geométricas del entorno*): walls, surfaces and open floor,
 //! on which routes are planned.
 

@@ -38,7 +38,7 @@ pub fn stranger(draws: &mut Draws) -> Outline {
 }
 
 /// Prints verdicts after each scan by the remaining shape uncertainty, and those of a policy that scans until
-/// it is small.
+/// that uncertainty is small.
 pub fn print(seed: u64, learnt: &[Alignment]) {
     let known: Vec<KnownShape> =
         (0..NAMES.len()).map(|k| KnownShape::new(NAMES[k], learnt[k * INSTANCES].model.clone())).collect();

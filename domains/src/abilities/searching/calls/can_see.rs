@@ -1,4 +1,4 @@
-//! `[can-see ?from ?on]`: true if a look from a viewpoint shows any part of a surface, by field of
+//! `[can-see ?from ?on]`: true if a view from a viewpoint shows any part of a surface, by field of
 //! view and range.
 
 use descry_planner::{Answer, Call, CallError};

@@ -1,4 +1,4 @@
-//! `gain-per-second`: greedy, the look with the greatest share of the doubt expected to be settled per
+//! `gain-per-second`: greedy, the view with the greatest share of the doubt expected to be settled per
 //! second.
 
 use super::policy::{Look, Policy, best};

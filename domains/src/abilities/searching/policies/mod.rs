@@ -1,8 +1,8 @@
-//! Policies that choose the next look: one file each behind one trait, and their list.
+//! Policies that choose the next view: one file each behind one trait, and their list.
 //!
-//! The default, `plan`, is no policy but the planner, which weighs gain against cost over several looks.
-//! A policy chooses one look after another and serves as a baseline. All use the same belief and the
-//! same thresholds for declaring a result. All but the sweep stop when no look is expected to settle any
+//! The default, `plan`, is no policy but the planner, which weighs gain against cost over several views.
+//! A policy chooses one view after another and serves as a baseline. All use the same belief and the
+//! same thresholds for declaring a result. All but the sweep stop when no view is expected to settle any
 //! doubt.
 
 mod gain_per_second;
@@ -27,11 +27,11 @@ use crate::situation::Situation;
 /// Name that stands for the planner in the list of policies.
 pub const PLAN: &str = "plan";
 
-/// Choice of the next look in a run, by the planner or by a policy.
+/// Choice of the next view in a run, by the planner or by a policy.
 pub struct Chooser {
     /// Planner or policy that chooses.
     pub by: By,
-    /// True if the first look is taken from the body's initial pose, without a choice.
+    /// True if the first view is taken from the body's initial pose, without a choice.
     pub first_look_here: bool,
 }
 
@@ -90,7 +90,7 @@ pub enum PolicyError {
         /// Names of all policies.
         known: String,
     },
-    /// The policy needs foresight, knowledge of what each look shows, which only simulated experiments
+    /// The policy needs foresight, knowledge of what each view shows, which only simulated experiments
     /// have.
     #[error(
         "the policy \"{name}\" knows in advance what each look shows and is for experiments in simulation only\n  take another, such as plan"
@@ -128,7 +128,7 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
         .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
 }
 
-/// True if the next look is a policy's choice: something requested is still uncertain, or nothing is
+/// True if the next view is a policy's choice: something requested is still uncertain, or nothing is
 /// requested, and the hand is empty. Other steps are left to the planner.
 pub fn is_asked(s: &Situation) -> bool {
     let own: Vec<usize> = (0..s.things.len()).filter(|&n| s.things[n].track.is_none()).collect();
@@ -138,7 +138,7 @@ pub fn is_asked(s: &Situation) -> bool {
     s.held.is_none() && (unsure || own.is_empty() && s.kinds.is_empty() && s.asked.is_empty())
 }
 
-/// Next look that a policy chooses among those not barred; `None` if the policy gives up or nothing is
+/// Next view that a policy chooses among those not barred; `None` if the policy gives up or nothing is
 /// left.
 pub fn next(
     policy: &mut dyn Policy,
@@ -151,7 +151,7 @@ pub fn next(
     if looks.is_empty() { None } else { policy.choose(situation, &looks) }
 }
 
-/// Look with the highest gain per second among those behind closed doors, except barred ones;
+/// View with the highest gain per second among those behind closed doors, except barred ones;
 /// `None` if there is none.
 pub fn behind(situation: &Situation, is_barred: &dyn Fn(&Look) -> bool) -> Option<Look> {
     let is_behind = |look: &Look| !situation.can_drive_to(look.from) && !is_barred(look);
@@ -160,13 +160,13 @@ pub fn behind(situation: &Situation, is_barred: &dyn Fn(&Look) -> bool) -> Optio
     gain_per_second::GainPerSecond.choose(situation, &looks)
 }
 
-/// Look from the current pose that settles the greatest share of the doubt; `None` if there is none.
+/// View from the current pose that settles the greatest share of the doubt; `None` if there is none.
 pub fn here(situation: &Situation) -> Option<Look> {
     let looks: Vec<Look> = open(situation).into_iter().filter(|look| look.from == situation.at).collect();
     best(&looks, |look| look.gain)
 }
 
-/// Feasible looks not yet taken, including those behind doors that can be opened, in candidate
+/// Feasible views not yet taken, including those behind doors that can be opened, in candidate
 /// order.
 fn open(situation: &Situation) -> Vec<Look> {
     let looks = situation.all_looks().into_iter();
@@ -191,7 +191,7 @@ pub fn travel_s(situation: &Situation, to: usize) -> f64 {
     }
 }
 
-/// Share of the goal's doubts that a look would settle, averaged over the doubts, 0 to 1.
+/// Share of the goal's doubts that a view would settle, averaged over the doubts, 0 to 1.
 pub fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
     let doubts = situation.doubts();
     let shares = doubts.iter().map(|doubt| doubt.share_settled(situation, (from, on), Taken::default()));

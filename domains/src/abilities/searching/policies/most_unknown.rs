@@ -1,4 +1,4 @@
-//! `most-unknown`: the look that shows most of the unobserved space above the surface.
+//! `most-unknown`: the view that shows most of the unobserved space above the surface.
 
 use super::policy::{Look, Policy, best};
 use super::unseen;

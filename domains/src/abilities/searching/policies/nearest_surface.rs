@@ -1,5 +1,5 @@
 //! `nearest-surface`: optimistic, nearest first. Goes to the nearest surface with open doubt, looks
-//! until no look there is worthwhile, then goes to the next.
+//! until no view there is worthwhile, then goes to the next.
 
 use super::policy::{Look, Policy, best};
 use crate::situation::Situation;

@@ -1,5 +1,5 @@
-//! `oracle`: knows what each look truly shows of the target, and takes the look that shows most. Where
-//! none shows any, as with an absent target, takes the look that settles most doubt. For experiments
+//! `oracle`: knows what each view truly shows of the target, and takes the view that shows most. Where
+//! none shows any, as with an absent target, takes the view that settles most doubt. For experiments
 //! only.
 
 use super::policy::{Foresight, Look, Policy, best};

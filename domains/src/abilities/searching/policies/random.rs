@@ -1,4 +1,4 @@
-//! `random`: any look, by the seed of the run.
+//! `random`: any view, by the seed of the run.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -12,8 +12,8 @@ const GRID_M: f64 = 0.05;
 /// Height up to which space counts, metres: that of the tallest published object.
 const HEIGHT_M: f64 = 0.28;
 
-/// Number of unobserved grid points accepted by `counts` that a look would show past known occluders; 0
-/// for a look without a camera pose.
+/// Number of unobserved grid points accepted by `counts` that a view would show past known occluders; 0
+/// for a view without a camera pose.
 pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point3<f64>) -> bool) -> f64 {
     let Some(map_from_camera) = situation.camera(look.from, look.on) else { return 0.0 };
     let eye = Point3::from(map_from_camera.translation.vector);

@@ -60,7 +60,7 @@ exec "${{DESCRY:-descry}}" experiment {file} --out {out} \
 /// An indexed Kubernetes job that includes the experiment's text, for `kubectl apply`.
 ///
 /// # Errors
-/// As [`slurm`].
+/// [`ExperimentError`] if the file is not an experiment, or has fewer jobs than shards.
 pub fn kubernetes(source: &Source, cluster: &Cluster) -> Result<String, ExperimentError> {
     let kind = checked(source, cluster)?;
     let Cluster { shards, threads, .. } = cluster;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// First line: identity of the experiment.
+/// First line of a journal, which identifies the experiment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
     /// The experiment's name.

@@ -77,7 +77,7 @@ pub struct Options {
 pub enum Ended {
     /// All jobs are finished; the results are written.
     Whole(Box<Results>),
-    /// This shard is finished, others are not.
+    /// The jobs of this shard are finished, those of other shards are not.
     Part {
         /// Number of finished jobs, in all shards whose folders are here.
         done: usize,

@@ -15,7 +15,7 @@ use crate::job::{Job, Numbered};
 use crate::kinds::kind::Kind;
 use crate::source::Source;
 
-/// A batch under way.
+/// Batch under way, as shown on its live page.
 pub struct Batch {
     kind: Box<dyn Kind>,
     jobs: Vec<Job>,

@@ -9,7 +9,7 @@ use super::table::Table;
 
 const SCRIPT: &str = include_str!("live.js");
 
-/// A section of the results.
+/// Section of the results: one element of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Section {
     /// A heading.

@@ -30,7 +30,7 @@ const TITLE_LETTER: f64 = 7.6;
 /// Maximum number of letters in a line of a category's name.
 const CATEGORY: usize = 20;
 
-/// A point with its interval.
+/// Point of a series: a measured value with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     /// Position along the numeric axis of [`Plot::Lines`], or the index of the category in [`Plot::Dots`].
@@ -44,7 +44,7 @@ pub struct Point {
 /// Points of one series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Name in the legend.
+    /// Name of the series in the legend.
     pub name: String,
     /// Points, in the order in which a line joins them.
     pub points: Vec<Point>,
@@ -73,20 +73,20 @@ impl Axis {
     }
 }
 
-/// A plot; `name` is its file's name.
+/// Plot, drawn as SVG.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Plot {
     /// Lines over a numeric axis.
     Lines {
         /// File name without its extension.
         name: String,
-        /// Heading.
+        /// Heading of the plot.
         title: String,
         /// Horizontal axis.
         x: Axis,
         /// Vertical axis.
         y: Axis,
-        /// The lines.
+        /// Lines of the plot, one for each series.
         series: Vec<Series>,
         /// True to draw the diagonal, the reference of a reliability plot.
         diagonal: bool,
@@ -97,9 +97,9 @@ pub enum Plot {
     Dots {
         /// File name without its extension.
         name: String,
-        /// Heading.
+        /// Heading of the plot.
         title: String,
-        /// Categories, from the top.
+        /// Names of the categories, from the top.
         categories: Vec<String>,
         /// Horizontal axis of values.
         x: Axis,
@@ -288,12 +288,13 @@ fn title_lines(title: &str) -> Vec<String> {
     wrapped(title, ((WIDTH - 28.0) / TITLE_LETTER) as usize)
 }
 
-/// Upper end of the plot below its title.
+/// Upper end of the plot's data area, below the lines of the title, pixels.
 fn top(title: &str) -> f64 {
     23.0 + ROW * title_lines(title).len() as f64
 }
 
-/// Begins the drawing; its white ground has the class `paper`, so that a page may use its own.
+/// Start of the SVG text, with the title. The white background has the class `paper`, so that a page may
+/// hide it.
 fn begin(title: &str, height: f64) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" height=\"{height}\" \

@@ -7,12 +7,12 @@ use descry_agent::shell;
 use crate::error::ExperimentError;
 use crate::overrides;
 
-/// An experiment file as it was read.
+/// Experiment file as read, with assignments of the command line.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// Path, as given.
+    /// Path of the file, as given.
     pub path: PathBuf,
-    /// Text, with the assignments carried out.
+    /// Text of the file, with the assignments carried out.
     pub text: String,
     /// Assignments of the command line, as given.
     pub assignments: Vec<String>,

@@ -23,10 +23,10 @@ const FLIPS: u32 = 10_000;
 /// Seed of the bootstrap and of the random signs.
 const SEED: u64 = 4;
 
-/// A measured value with its interval.
+/// Estimated value with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Value.
+    /// Estimate from all observations.
     pub value: f64,
     /// 95 % interval; `None` if there are too few groups.
     pub interval: Option<[f64; 2]>,
@@ -91,7 +91,7 @@ fn at_an_end(found: Estimate, groups: usize) -> Estimate {
     Estimate { interval: rate(hits, groups).and_then(|e| e.interval), ..found }
 }
 
-/// Mean of `a - b`; none without pairs.
+/// Mean of `a - b` with its bootstrap interval; `None` without pairs.
 pub fn difference(pairs: &[Pair]) -> Option<Estimate> {
     let sums = sums(pairs.iter().map(|p| (p.group, [p.a - p.b, 1.0])));
     estimate(pairs.len(), &sums, |[total, n]| total / n)
@@ -142,7 +142,7 @@ pub fn median(values: &[f64]) -> Option<f64> {
     }
 }
 
-/// Sums of each group, ordered by group number.
+/// Sums of the first and of the second numbers of each group, ordered by group number.
 fn sums(values: impl Iterator<Item = (u64, [f64; 2])>) -> Vec<[f64; 2]> {
     let mut groups = std::collections::BTreeMap::<u64, [f64; 2]>::new();
     for (group, [a, b]) in values {
@@ -182,20 +182,20 @@ pub fn brier(forecasts: &[Forecast]) -> Option<f64> {
     (!forecasts.is_empty()).then(|| forecasts.iter().map(squared).sum::<f64>() / forecasts.len() as f64)
 }
 
-/// A bin of a reliability plot.
+/// Bin of a reliability plot: the forecasts with stated probabilities in a range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bin {
     /// Lower bound of the bin.
     pub from: f64,
-    /// Upper bound; included in the last bin only.
+    /// Upper bound of the bin, which only the last bin includes.
     pub to: f64,
-    /// Mean of the stated probabilities.
+    /// Mean of the stated probabilities in the bin.
     pub stated: f64,
     /// Share of the forecasts that came true, with Wilson's interval.
     pub observed: Estimate,
 }
 
-/// Non-empty bins of equal width.
+/// Sorts forecasts into `bins` bins of equal width; returns the bins that are not empty.
 pub fn reliability(forecasts: &[Forecast], bins: usize) -> Vec<Bin> {
     let bins = bins.max(1);
     let bin_of = |p: f64| ((p * bins as f64).floor().max(0.0) as usize).min(bins - 1);

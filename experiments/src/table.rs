@@ -18,7 +18,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// An empty table.
+    /// Table without rows, with the names of its columns in `head`.
     pub fn new(title: impl Into<String>, note: impl Into<String>, head: &[&str]) -> Self {
         let head = head.iter().map(ToString::to_string).collect();
         Self { title: title.into(), note: note.into(), head, rows: Vec::new() }

@@ -17,7 +17,7 @@ use crate::job::{Finished, Numbered, Row};
 use crate::kinds::kind::Kind;
 use crate::source::Source;
 
-/// Results of an experiment.
+/// Results of an experiment, as written to its folder.
 #[derive(Debug, Clone)]
 pub struct Results {
     /// Content of `summary.json`.

@@ -24,7 +24,7 @@ use crate::source::Source;
 use crate::statistics::{self, Observation};
 use crate::table::{Table, counted, shown};
 
-/// Keys of a file of this kind.
+/// Keys of an experiment file of the kind `faults`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -67,7 +67,7 @@ struct Text {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
-    /// Name in tables and plots.
+    /// Name of the case in tables and plots.
     name: String,
     /// Injected faults; empty for a run without any.
     #[serde(default, rename = "fault")]

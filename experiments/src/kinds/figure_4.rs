@@ -27,7 +27,7 @@ mod score;
 mod summary;
 mod views;
 
-/// Keys of a file of this kind.
+/// Keys of an experiment file of the kind `figure-4`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -66,7 +66,7 @@ struct Text {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Set {
-    /// Name in tables and plots.
+    /// Name of the set in tables and plots.
     name: String,
     /// Seed of the first arrangement; each further one has the next.
     first_seed: u64,

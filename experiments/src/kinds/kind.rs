@@ -20,7 +20,7 @@ pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, String> {
     runtime.map_err(|e| format!("the runtime could not be started: {e}"))
 }
 
-/// A kind of experiment, with the settings of a file.
+/// Kind of experiment, with the settings from an experiment file.
 pub trait Kind: Send + Sync {
     /// Keys common to all experiment files.
     fn head(&self) -> &Head;
@@ -80,7 +80,7 @@ impl OtherBody {
         &self.0
     }
 
-    /// Texts of the robot's program, by path.
+    /// Texts of the files that the robot's command line names, by path.
     pub(crate) fn texts(&self) -> BTreeMap<PathBuf, String> {
         program_texts(self.0.split_whitespace(), Path::new("."))
     }
@@ -100,7 +100,7 @@ impl TryFrom<String> for OtherBody {
     }
 }
 
-/// Summary of all jobs.
+/// Summary of finished jobs.
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
     /// Values for scripts: `summary.json`.

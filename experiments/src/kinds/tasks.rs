@@ -27,7 +27,7 @@ mod summary;
 
 use score::Truly;
 
-/// Keys of a file of this kind.
+/// Keys of an experiment file of the kind `tasks`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -89,7 +89,7 @@ struct GoalText {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
-    /// Name in tables and plots.
+    /// Name of the case in tables and plots.
     name: String,
     /// Body instead of the simulator: `program:COMMAND`, whose world has the places and objects of the scene.
     #[serde(default)]

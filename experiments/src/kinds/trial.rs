@@ -28,7 +28,7 @@ const ARRANGEMENTS: u64 = 20;
 /// Stride between the tried seeds, which keeps scenes from sharing them.
 const NEXT_ARRANGEMENT: u64 = 1_000_003;
 
-/// Note on the intervals of a table.
+/// Note on shares, means and intervals, shown below a table.
 pub(super) const NOTE: &str = "Shares with Wilson's intervals; means with intervals bootstrapped over arrangements, where there are \
                                8 or more; 95 % each. Seconds are those of the robot's clock. A run that ended with an error counts \
                                as not right.";
@@ -51,7 +51,7 @@ pub(super) struct Trial<'a> {
     pub seed: u64,
     /// Injected faults.
     pub faults: FaultPlan,
-    /// Name of the policy.
+    /// Name of the policy that chooses where to look next.
     pub policy: &'a str,
     /// True if the first view is taken from the start, whatever the policy.
     pub first_look_here: bool,
@@ -72,9 +72,9 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Resul
 
 /// Result of one run.
 pub(super) struct Lived {
-    /// Report of the run.
+    /// Agent's report on the run.
     pub report: Report,
-    /// True scene at the end.
+    /// True state of the scene at the end of the run.
     pub truth: Truth,
     /// Number of completed executions of each action, by name.
     pub carried: BTreeMap<String, usize>,
@@ -131,7 +131,7 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
     Ok(Lived { report, truth, carried, arrangement, share, clock })
 }
 
-/// A body in its world, before a run.
+/// Body in its world, before a run.
 struct Staged {
     body: Body,
     /// Goal as parsed for this body.
@@ -227,7 +227,7 @@ fn measured(trial: &Trial<'_>, report: &Report) -> Row {
     value.as_object().cloned().unwrap_or_default()
 }
 
-/// A finished run, for the summaries.
+/// Measurements of a finished run, as the summaries read them from a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Scene of the run; runs in one scene are not independent.
@@ -250,7 +250,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Reads a row; `None` for a failed job.
+    /// Reads the measurements from a row of the journal; `None` for a failed job.
     pub fn read(group: u64, row: &Row) -> Option<Self> {
         let truth = |key: &str| row.get(key).and_then(Value::as_bool);
         let number = |key: &str| row.get(key).and_then(Value::as_f64);

@@ -22,7 +22,7 @@ use crate::source::Source;
 
 mod summary;
 
-/// Keys of a file of this kind.
+/// Keys of an experiment file of the kind `where-to-look`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -75,7 +75,7 @@ struct Text {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Occlusion {
-    /// Name in tables and plots.
+    /// Name of the level in tables and plots.
     name: String,
     /// Minimum and maximum share of the target that is visible from the start.
     visible_from_start: [f64; 2],
@@ -99,7 +99,7 @@ struct WhereToLook {
     text: Text,
     domain: Domain,
     goal: Goal,
-    /// The scene with each level of occlusion.
+    /// Scene, once for each level of occlusion.
     specs: Vec<SceneSpec>,
     jobs: Vec<Setting>,
 }

@@ -3,7 +3,7 @@
 /// Approximate number of ticks of an axis.
 const TICKS: f64 = 6.0;
 
-/// A linear scale.
+/// Linear mapping of values along an axis to positions on the plot.
 pub struct Scale {
     /// Value at the start of the axis.
     pub low: f64,
@@ -29,13 +29,13 @@ impl Scale {
         Self { low, high, from, to, step }
     }
 
-    /// Position of a value, clamped to the ends.
+    /// Position of a value on the plot, clamped to the ends of the axis.
     pub fn at(&self, value: f64) -> f64 {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         self.from + share * (self.to - self.from)
     }
 
-    /// Round values along the axis.
+    /// Round values along the axis at which ticks are drawn.
     pub fn ticks(&self) -> Vec<f64> {
         let (first, last) =
             ((self.low / self.step - 1e-9).ceil() as i64, (self.high / self.step + 1e-9).floor() as i64);

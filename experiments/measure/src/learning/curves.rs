@@ -162,7 +162,7 @@ fn look_for(
     claims.extend(own);
 }
 
-/// Median time of a recognition, seconds.
+/// Median time of a recognition among some models, seconds.
 fn seconds(models: &[&Model], seed: u64) -> Result<f64, String> {
     let (library, bodies) = (library(models), bodies());
     let mut draws = Draws(seed ^ 0x71);

@@ -47,7 +47,7 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
     models
 }
 
-/// A claim as a line of CSV.
+/// Claim as a line of CSV, with its evidence.
 pub fn line(scene: usize, model: usize, right: bool, e: &PoseEvidence) -> String {
     format!(
         "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{}",

@@ -83,7 +83,7 @@ fn recolour(view: &mut View, draws: &mut Draws) {
     view.cloud.colours = Some((0..colours.len()).map(beside).collect());
 }
 
-/// A model in the frame of its body.
+/// Model of a body (its index), in the frame of that body.
 pub struct Model {
     pub body: usize,
     pub cloud: Cloud,
@@ -163,7 +163,7 @@ pub fn is_right(scene: &Scene, surfaces: &[Cloud], body: usize, found: &Recognis
     })
 }
 
-/// Scores of one model over all scenes.
+/// Numbers of right and wrong answers, and of missed objects, for one model over all scenes.
 #[derive(Default)]
 pub struct Tally {
     pub right: usize,

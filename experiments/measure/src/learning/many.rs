@@ -12,13 +12,13 @@ use descry_perception::calibration::Claim;
 use descry_perception::learning::{Recognised, choose};
 use std::time::Instant;
 
-/// Numbers of known models.
+/// Numbers of models that are known at once, in turn.
 const KNOWN: [usize; 3] = [5, 20, 50];
 /// Number of objects in a scene.
 const THINGS: usize = 5;
 /// Offset of the seeds of generated objects, which keeps them apart from those that confidence was fitted to.
 const APART: u64 = 1 << 32;
-/// Number of timed scenes.
+/// Number of scenes in which recognition is timed.
 const TIMED: usize = 5;
 
 /// Scores over all scenes.

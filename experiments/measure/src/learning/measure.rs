@@ -11,10 +11,10 @@ use descry_perception::{Cloud, Neighbours};
 const VISIBLE_M: f32 = 0.01;
 /// Maximum distance of a learned point from an explained true point, metres, as in the paper.
 const EXPLAINED_M: f32 = 0.02;
-/// A stricter distance than the paper's, metres.
+/// Distance in place of [`EXPLAINED_M`] in the strict score, stricter than the paper's, metres.
 const STRICT_M: f32 = 0.006;
 
-/// Scores of a run.
+/// Scores of a run; `first`, `model` and `strict` are recall and precision.
 #[derive(Clone, Copy, Debug)]
 pub struct Score {
     pub first: (f64, f64),
@@ -79,7 +79,7 @@ pub fn aligned(model: &LearnedModel, registered: bool, run: &Run, truth: &Cloud)
     found.transformed(&onto(&found, truth))
 }
 
-/// Scores a run against its truth.
+/// Compares the models of a run with the true surface.
 pub fn score(run: &Run, body: &Body) -> Score {
     let truth = truth(body, &run.world_from_body);
     let seen = visible(run, &truth, std::iter::once(0));
@@ -156,13 +156,13 @@ pub fn doubled(model: &LearnedModel, registered: bool, body: &Body, run: &Run) -
     (distances.iter().sum::<f64>() / n as f64, within, twice as f64 / seen.max(1) as f64)
 }
 
-/// Formats mean and standard deviation.
+/// Formats mean and standard deviation of values, as `1.20±0.10`.
 pub fn pair(values: impl Iterator<Item = f64>) -> String {
     let (mean, sigma) = spread(&values.collect::<Vec<f64>>());
     format!("{mean:.2}±{sigma:.2}")
 }
 
-/// Mean and standard deviation.
+/// Mean and (population) standard deviation of values.
 pub fn spread(values: &[f64]) -> (f64, f64) {
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Table with a header.
+/// Table with a header, printed and shown on the page.
 pub struct PageTable {
     head: Vec<String>,
     rows: Vec<Vec<String>>,
@@ -27,7 +27,7 @@ impl PageTable {
     }
 }
 
-/// The page under construction.
+/// HTML page under construction, with the folder of its files.
 pub struct Page {
     dir: PathBuf,
     body: String,

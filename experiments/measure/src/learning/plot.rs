@@ -108,7 +108,7 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-/// A plot with a name.
+/// Panel of lines, with its name.
 pub struct LinePlot {
     pub name: String,
     pub lines: Vec<Line>,
@@ -177,7 +177,7 @@ pub fn panels(panels: &[LinePlot], axes: (&str, &str), path: &Path) -> Result<()
     std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Cross-section of a model, metres.
+/// Cross-section of a model: its name, and points in metres.
 pub struct Slice {
     pub name: &'static str,
     pub points: Vec<(f32, f32)>,

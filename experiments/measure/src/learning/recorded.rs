@@ -119,7 +119,7 @@ fn in_optical_frame(cloud: Cloud) -> View {
 /// point, pixels, and shift, metres. Fitted by matching depth steps to image edges over all frames.
 const COLOUR: (f64, [f64; 2], [f64; 2]) = (525.0, [322.0, 236.0], [-0.029, 0.005]);
 
-/// A depth frame coloured from its image.
+/// View of a depth frame, coloured from the image of the frame.
 fn coloured(mut view: View, dir: &Path, name: &str) -> Result<View, String> {
     let path = dir.join(format!("{name}.color.jpg"));
     let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?.to_rgb8();

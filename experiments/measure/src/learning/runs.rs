@@ -35,7 +35,7 @@ pub struct Run {
     pub learn_s: f64,
 }
 
-/// Camera positions of the keyframes.
+/// Camera positions of the keyframes around an object, world frame, metres.
 fn stands(object: &Point3<f64>, from: f64, options: &RunOptions, draws: &mut Draws) -> Vec<Point3<f64>> {
     let mut stands = Vec::new();
     let steps = 72;
@@ -131,12 +131,12 @@ pub fn run(body: &Body, beside: &Body, options: RunOptions) -> Result<Run, Strin
     Ok(Run { views, truths: poses, keyframes, mask, world_from_body, model, notice_s, learn_s })
 }
 
-/// A modelling method.
+/// Modelling method, for comparison with the usual one.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
     /// True if keyframes are registered; false: their stated poses are used.
     pub registered: bool,
-    /// As [`LearnOptions::smooth`].
+    /// True if the model is smoothed, as by [`LearnOptions::smooth`].
     pub smooth: bool,
     pub name: &'static str,
 }
@@ -148,7 +148,7 @@ pub fn modelled(run: &Run, way: &Way) -> Result<LearnedModel, LearningError> {
     learn(&run.views, keyframes, &run.mask, &options)
 }
 
-/// Radius of a body around its axis, metres.
+/// Maximum distance of the surface of a body from its vertical axis, metres.
 pub fn radius_m(body: &Body) -> f64 {
     let surface = Room::surface(body, 0.01);
     surface.points.iter().map(|p| f64::from(p.xy().coords.norm())).fold(0.0, f64::max)

@@ -73,7 +73,7 @@ fn flat(seed: u64) -> (Building, Isometry2<f64>) {
     (building, start)
 }
 
-/// Adds a wall, with a door if requested.
+/// Adds a wall from `a` to `b`, with an opening for a door if `door`.
 fn wall(building: &mut Building, a: Point2<f64>, b: Point2<f64>, door: bool, draws: &mut Draws) {
     let along = (b - a).normalize();
     let length = (b - a).norm();

@@ -9,7 +9,7 @@ use descry_perception::mapping::{MapOptions, Station, Survey};
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::path::Path;
 
-/// Number of halls.
+/// Number of simulated halls with posts.
 const HALLS: u64 = 20;
 
 /// Poses around the rows of posts, and between them.
@@ -19,7 +19,7 @@ fn way() -> Vec<Isometry2<f64>> {
     along(&corners, 0.8, 0.5)
 }
 
-/// Survey of a hall at poses with these errors: metres, radians.
+/// Survey of a hall at poses with errors `off`: standard deviations, metres and radians.
 fn seen(hall: &Building, edge_m: f64, off: (f64, f64), seed: u64) -> Survey {
     let truths = way();
     let mut draws = Draws(seed);
@@ -34,7 +34,7 @@ fn seen(hall: &Building, edge_m: f64, off: (f64, f64), seed: u64) -> Survey {
     survey
 }
 
-/// Prints detection scores of pillars.
+/// Prints how many of the posts are found, and how accurately.
 pub fn print(seed: u64, out: Option<&Path>) -> Result<(), String> {
     println!(
         "\n{HALLS} halls with eight posts each, some round: pillars found of those that there are, false ones, how far axis and radius are off (cm); walls"

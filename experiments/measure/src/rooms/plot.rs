@@ -6,7 +6,7 @@ use descry_perception::occupancy::{Occupancy, Space};
 use std::fmt::Write;
 use std::path::Path;
 
-/// A section of the floor plan, drawn to scale.
+/// Part of a floor plan, drawn to scale as SVG.
 pub struct Sheet {
     low: Point2<f64>,
     high: Point2<f64>,

@@ -11,7 +11,7 @@ use descry_perception::nalgebra::Isometry2;
 pub const LONG_M: f64 = 40.0;
 pub const SHORT_M: f64 = 20.0;
 
-/// Matching methods, with short names.
+/// Methods of matching successive stations, with short names.
 const MATCHERS: [(&str, Matcher); 5] = [
     ("odometry", Matcher::Odometry),
     ("ICP, all points", Matcher::Icp),
@@ -41,7 +41,7 @@ pub fn steps(stations: &[Station], rectify: &RectifyOptions) -> Result<Vec<PairF
     rectify_drive(stations, rectify).map_err(|e| e.to_string())
 }
 
-/// Loop closures of a drive.
+/// Loop closures found in a drive at given poses.
 pub fn again(
     stations: &[Station],
     poses: &[Isometry2<f64>],
@@ -87,7 +87,7 @@ pub fn pairs(seed: u64) {
     }
 }
 
-/// Prints the residuals at loop closure.
+/// Prints pose errors at loop closure, for drives around a corridor.
 pub fn loops(seed: u64) -> Result<(), String> {
     println!(
         "\nonce around {:.0} m: way (m) and turn (degrees) off where the drive came back; farthest and mean pose off the truth (m)",

@@ -251,7 +251,7 @@ fn dining_room(folder: &Path, out: Option<&Path>) -> Result<(), String> {
     Ok(())
 }
 
-/// Prints planes of real rooms.
+/// Prints results on recorded real rooms: two laser scans and five views; nothing without the data.
 pub fn rooms(out: Option<&Path>) -> Result<(), String> {
     let Some(folder) = data() else { return Ok(()) };
     println!("\nreal rooms: two laser scans, five views");

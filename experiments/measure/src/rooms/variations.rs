@@ -9,7 +9,7 @@ use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// Poses every 20 degrees at each place.
+/// Poses at each place (x, y in metres), with headings every 20 degrees.
 fn looking_round(places: &[(f64, f64)]) -> Vec<Isometry2<f64>> {
     let turn = |(x, y): (f64, f64)| {
         (0..18).map(move |i| Isometry2::new(Vector2::new(x, y), TAU * f64::from(i) / 18.0))
@@ -61,7 +61,7 @@ fn bare(left: f64, right: f64) -> (Building, Vec<Isometry2<f64>>) {
     (building, along(&[at(0.0, 0.0), at(16.0, 0.0)], 0.8, 0.3))
 }
 
-/// Prints the results.
+/// Prints errors of poses and walls in buildings of other forms.
 pub fn print(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let at = Point2::new;
     println!("\nother buildings: poses by the wheels and rectified, walls at true poses");

@@ -19,7 +19,7 @@ use lab::{Run, models};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Solvers and objectives, with short names.
+/// Methods of alignment: short name, solver, and objective (`None`: the default).
 const METHODS: [(&str, Solver, Option<Objective>); 4] = [
     ("centred, least squares", Solver::LeastSquares, None),
     ("centred, simplex", Solver::Simplex, None),
@@ -27,7 +27,7 @@ const METHODS: [(&str, Solver, Option<Objective>); 4] = [
     ("BV alone, simplex (paper)", Solver::Simplex, Some(Objective::Violation)),
 ];
 
-/// The options of a method.
+/// Solver options of a method, given its index in [`METHODS`].
 fn options(method: usize) -> SolverOptions {
     let (_, solver, objective) = METHODS[method];
     SolverOptions { solver, objective: objective.unwrap_or_default(), ..SolverOptions::default() }

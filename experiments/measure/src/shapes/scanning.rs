@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 const PLACES: usize = 16;
 pub const MOST: usize = 8;
 
-/// Policy for the next bearing.
+/// Policy that chooses the bearing of the next scan.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Policy {
     Settling,

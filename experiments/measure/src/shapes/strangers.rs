@@ -118,7 +118,7 @@ fn scan_after_scan(
     all
 }
 
-/// Index of the verdict in [`Counts`].
+/// Verdict on an object after some scans, as an index in [`Counts`].
 fn verdict(
     alignment: &Alignment,
     loose_m: f64,

@@ -12,7 +12,7 @@ use descry_perception::laser::{
 };
 use descry_perception::nalgebra::Isometry2;
 
-/// Mean and standard deviation.
+/// Mean and sample standard deviation of values.
 pub fn mean_and_spread(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();

@@ -29,7 +29,7 @@ fn least_ms<T>(mut run: impl FnMut() -> T) -> f64 {
     least
 }
 
-/// Prints the times.
+/// Prints the times of modelling, with the number of error evaluations, and those of recognition.
 pub fn print(seed: u64, learnt: &[Alignment]) {
     let map = map_of_the_lab(&mut Draws(seed));
     println!("\ntimes, ms: a model of 7 or 8 scans, and of 30; times that the errors were computed");

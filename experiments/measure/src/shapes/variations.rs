@@ -23,7 +23,7 @@ struct Tally {
     /// Root mean square distance of readings from their true places on the object, after the best common
     /// motion, metres.
     off_m: Vec<f64>,
-    /// Area of the hull relative to the true one.
+    /// Area of the model's hull divided by the true area.
     area: Vec<f64>,
     exterior_m: f64,
     /// Number of alignments that report contradictory scans.

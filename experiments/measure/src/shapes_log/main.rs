@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 /// Residual from which scans contradict each other, metres: twice the precision of the laser.
 const CONTRADICTS_M: f64 = 0.02;
-/// Number of objects drawn.
+/// Maximum number of objects that are drawn.
 const DRAWN: usize = 12;
 
 /// An object with two sets of scans and their models.

@@ -14,7 +14,7 @@ const MODES: [&str; 2] = ["single", "merged"];
 const BINS: usize = 10;
 const NOTE: &str = "Shares with 95 % intervals, bootstrapped over arrangements.";
 
-/// A measure of a cell, with its name.
+/// Measure of a cell: its name, and the function that estimates it.
 type Measure = (&'static str, fn(&Cell) -> Option<Estimate>);
 
 const MEASURES: [Measure; 2] = [("precision", precision), ("recall", recall)];

@@ -25,7 +25,7 @@ const BEYOND_WALL_M: f64 = 0.003;
 pub(super) struct Taken {
     /// Views, in the order in which they were taken.
     pub views: Vec<View>,
-    /// True pose of the camera for each view.
+    /// True pose of the camera in the map frame, for each view.
     pub map_from_camera: Vec<Isometry3<f64>>,
     /// Pixels of the handle of each object in each view of an ideal camera; no entry for objects without a
     /// handle, nor for bodies other than the simulator.
@@ -36,7 +36,7 @@ pub(super) struct Taken {
     pub options: (MergeOptions, SceneOptions),
 }
 
-/// A body in front of an arrangement.
+/// Body in an arranged scene, ready to take the views.
 pub(super) struct Staged {
     body: Body,
     ideal: Option<Ideal>,
@@ -46,7 +46,7 @@ pub(super) struct Staged {
 type Ideal = (Arc<SimRobot>, Vec<(usize, String)>);
 
 impl Staged {
-    /// Any body that reports the ground truth.
+    /// Body of any kind that reports the ground truth, without an ideal camera.
     pub fn of(body: Body) -> Self {
         Self { body, ideal: None }
     }
@@ -56,7 +56,7 @@ impl Staged {
     }
 }
 
-/// The simulator with an arrangement of a scene.
+/// Simulated body in the arrangement of a scene that a seed draws.
 pub(super) fn simulated(spec: &SceneSpec, seed: u64) -> Result<Staged, String> {
     let scene = arrange(spec, seed).map_err(|e| e.to_string())?;
     let handled = (0..).zip(&scene.objects).filter(|(_, o)| has_handle(&o.shape));

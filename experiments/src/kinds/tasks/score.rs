@@ -29,13 +29,13 @@ pub(super) enum Truly {
 }
 
 impl Truly {
-    /// True if the judgement needs a surface.
+    /// True if the criterion is about a surface, which the goal must then name.
     pub fn needs_surface(self) -> bool {
         matches!(self, Self::Answered | Self::Stands | Self::AllStand)
     }
 }
 
-/// Measurements of one run.
+/// Row of measurements of one run, with a column for each stage of the goal.
 pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Lived) -> Row {
     let Lived { report, truth, carried, .. } = lived;
     let scored = Scored::of(goal, tolerance_m, report, truth);
@@ -64,7 +64,7 @@ pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Live
     row
 }
 
-/// A verdict compared with the truth.
+/// Comparison of the verdict of a run with the truth.
 #[derive(Debug, PartialEq)]
 pub(super) struct Scored {
     /// True if the verdict is right: achieved and said so, or impossible and said so.

@@ -47,7 +47,7 @@ impl Run<'_> {
     }
 }
 
-/// Statistics of some runs.
+/// Statistics of some runs; shares and means in the order of `SHARES` and `MEANS`.
 struct Figures {
     runs: usize,
     errors: usize,

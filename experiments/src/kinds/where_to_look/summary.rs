@@ -15,7 +15,7 @@ const BINS: usize = 10;
 const NOTE: &str = "Shares with Wilson's intervals; means with intervals bootstrapped over scenes, where there are 8 or more; 95 % \
                     each. Seconds are those of the robot's clock. A run without the right verdict counts with the views that it took.";
 
-/// A run with its setting.
+/// Setting and measurements of a run.
 type Run<'a> = (&'a Setting, Measured);
 
 /// Statistics of some runs of one policy.

@@ -1,4 +1,4 @@
-//! `rear-side`: the view that shows most unobserved space directly behind observed surfaces, where
+//! `rear-side`: the view that shows most unobserved space right beside occupied space, where
 //! objects continue or hide (rear side voxels of Delmerico et al., *A comparison of volumetric
 //! information gain metrics*, section III).
 

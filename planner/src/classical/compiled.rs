@@ -41,7 +41,7 @@ impl<T> Lists<T> {
 
     /// List by index.
     #[inline]
-    pub(crate) fn get(&self, index: usize) -> &[T] {
+    pub fn get(&self, index: usize) -> &[T] {
         &self.items[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 
@@ -258,7 +258,7 @@ impl Compiled {
 
     /// Identifier of a fact.
     #[inline]
-    pub(crate) fn id(&self, fact: GroundFact) -> u32 {
+    pub fn id(&self, fact: GroundFact) -> u32 {
         self.offsets[fact.variable as usize] + fact.value
     }
 
@@ -295,7 +295,7 @@ impl Compiled {
     }
 
     /// Number of operators.
-    pub(crate) fn operators(&self) -> usize {
+    pub fn operators(&self) -> usize {
         self.costs.len()
     }
 

@@ -54,9 +54,20 @@ struct Find<'a> {
     all: Vec<Landmark>,
     by_facts: FxHashMap<Vec<u32>, u32>,
     queue: Vec<u32>,
-    initial: Vec<bool>,
+    /// First operator or axiom that reaches each fact in the delete relaxation; [`INITIAL`] or [`NEVER`].
+    supporters: Vec<u32>,
+    /// Number of unreachable or lost preconditions, by operator and axiom.
+    lacking: Vec<u32>,
+    /// Facts lost without the landmark at hand, itself included.
+    lost: Vec<u32>,
+    is_lost: Vec<bool>,
     work: usize,
 }
+
+/// Supporter of a fact that holds initially.
+const INITIAL: u32 = u32::MAX;
+/// Supporter of a fact that is unreachable.
+const NEVER: u32 = u32::MAX - 1;
 
 impl Landmarks {
     /// Finds landmarks of a task; returns those found so far once `stop` returns true.
@@ -100,20 +111,24 @@ impl<'a> Find<'a> {
             .flat_map(|op| task.preconditions.get(op as usize).iter().map(move |&f| (task.id(f), op)));
         let bodies = (0..task.axiom_heads.len())
             .flat_map(|a| task.axiom_bodies.get(a).iter().map(move |&f| (task.id(f), operators + a as u32)));
-        let mut initial = vec![false; task.facts];
-        for (&offset, &value) in task.offsets.iter().zip(&task.initial) {
-            initial[(offset + value) as usize] = true;
-        }
-        Find {
+        let missing = |facts: &[GroundFact]| facts.len() as u32;
+        let mut find = Find {
             task,
             achievers: Lists::group(task.facts, effects.chain(heads)),
             needed_by: Lists::group(task.facts, needs.chain(bodies)),
             all: Vec::new(),
             by_facts: FxHashMap::default(),
             queue: Vec::new(),
-            initial,
+            supporters: vec![NEVER; task.facts],
+            lacking: Vec::with_capacity(task.operators() + task.axiom_heads.len()),
+            lost: Vec::new(),
+            is_lost: vec![false; task.facts],
             work: 0,
-        }
+        };
+        find.lacking.extend((0..task.operators()).map(|op| missing(task.preconditions.get(op))));
+        find.lacking.extend((0..task.axiom_heads.len()).map(|a| missing(task.axiom_bodies.get(a))));
+        find.explore();
+        find
     }
 
     fn needs(&self, operator: u32) -> &'a [crate::ground::GroundFact] {
@@ -143,15 +158,16 @@ impl<'a> Find<'a> {
         let task = self.task;
         let facts = self.all[id as usize].facts.clone();
         let compared = |f: u32| task.variables[f as usize] as usize >= task.numbers.first;
-        if facts.iter().any(|&f| self.initial[f as usize] || compared(f)) {
+        if facts.iter().any(|&f| self.is_initial(f) || compared(f)) {
             return;
         }
-        let reached = (self.work < EXPLORATION_WORK).then(|| self.reach_without(&facts));
-        let possible = |op: u32| {
-            self.needs(op).iter().all(|&f| {
-                let f = task.id(f);
-                !facts.contains(&f) && reached.as_ref().is_none_or(|r| r[f as usize])
-            })
+        let is_explored = self.work < EXPLORATION_WORK;
+        if is_explored {
+            self.lose(&facts);
+        }
+        let possible = |op: u32| match is_explored {
+            true => self.lacking[op as usize] == 0,
+            false => self.needs(op).iter().all(|&f| !facts.contains(&task.id(f))),
         };
         let mut first: Vec<u32> = facts
             .iter()
@@ -220,7 +236,7 @@ impl<'a> Find<'a> {
         let single: Vec<u32> = found.iter().map(|f| f[0]).collect();
         for (&symbol, (_, count, facts)) in &symbols {
             let fits = *count == all && symbol != u32::MAX && (2..=MOST_ALTERNATIVES).contains(&facts.len());
-            if fits && facts.iter().all(|f| !self.initial[*f as usize] && !single.contains(f)) {
+            if fits && facts.iter().all(|f| !self.is_initial(*f) && !single.contains(f)) {
                 let mut facts = facts.clone();
                 facts.sort_unstable();
                 found.push(facts);
@@ -230,51 +246,116 @@ impl<'a> Find<'a> {
         found
     }
 
-    /// Delete-relaxed reachability of each fact, if the facts `without` never become true.
-    fn reach_without(&mut self, without: &[u32]) -> Vec<bool> {
+    /// True if a fact holds in the initial state.
+    fn is_initial(&self, fact: u32) -> bool {
+        let variable = self.task.variables[fact as usize] as usize;
+        self.task.initial[variable] == fact - self.task.offsets[variable]
+    }
+
+    /// Facts that an operator adds, whatever the conditions of its effects, or the head of an axiom.
+    fn adds(&self, operator: u32) -> impl Iterator<Item = u32> + use<'a> {
         let task = self.task;
-        let operators = task.operators();
-        let mut missing: Vec<u32> = (0..operators)
-            .map(|op| task.preconditions.get(op).len() as u32)
-            .chain((0..task.axiom_heads.len()).map(|a| task.axiom_bodies.get(a).len() as u32))
-            .collect();
-        let mut reached = self.initial.clone();
-        for variable in task.basic..task.domains.len() {
-            reached[task.offsets[variable] as usize + 1] = true;
-        }
+        let axiom = (operator as usize).checked_sub(task.operators());
+        let effects = if axiom.is_none() { task.effects.get(operator as usize) } else { &[] };
+        let head = axiom.map(|axiom| task.id(task.axiom_heads[axiom]));
+        effects.iter().map(|effect| task.id(effect.fact)).chain(head)
+    }
+
+    /// Explores the delete relaxation from the initial state.
+    fn explore(&mut self) {
+        let task = self.task;
+        let initial = task.offsets.iter().zip(&task.initial).map(|(&offset, &value)| offset + value);
+        let underived = (task.basic..task.domains.len()).map(|variable| task.offsets[variable] + 1);
         // What numbers can become is left open.
-        for variable in task.numbers.first..task.domains.len() {
-            reached[task.offsets[variable] as usize] = true;
-        }
-        let mut queue: Vec<u32> = (0..task.facts as u32).filter(|&f| reached[f as usize]).collect();
-        let fire = |op: usize, reached: &mut Vec<bool>, queue: &mut Vec<u32>| {
-            let mut reach = |fact: u32| {
-                if !reached[fact as usize] && !without.contains(&fact) {
-                    reached[fact as usize] = true;
-                    queue.push(fact);
-                }
-            };
-            if op < operators {
-                task.effects.get(op).iter().for_each(|e| reach(task.id(e.fact)));
-            } else {
-                reach(task.id(task.axiom_heads[op - operators]));
+        let compared = (task.numbers.first..task.domains.len()).map(|variable| task.offsets[variable]);
+        let mut queue: Vec<u32> = initial.chain(underived).chain(compared).collect();
+        queue.sort_unstable();
+        queue.dedup();
+        queue.iter().for_each(|&fact| self.supporters[fact as usize] = INITIAL);
+        for operator in 0..self.lacking.len() as u32 {
+            if self.lacking[operator as usize] == 0 {
+                self.support(operator, &mut queue);
             }
-        };
-        for op in (0..missing.len()).filter(|&op| missing[op] == 0) {
-            fire(op, &mut reached, &mut queue);
         }
         while let Some(fact) = queue.pop() {
-            let waiting = self.needed_by.get(fact as usize);
-            self.work += waiting.len() + 1;
-            for &op in waiting {
-                missing[op as usize] -= 1;
-                if missing[op as usize] == 0 {
-                    fire(op as usize, &mut reached, &mut queue);
+            for index in 0..self.needed_by.get(fact as usize).len() {
+                let operator = self.needed_by.get(fact as usize)[index];
+                self.lacking[operator as usize] -= 1;
+                if self.lacking[operator as usize] == 0 {
+                    self.support(operator, &mut queue);
                 }
             }
         }
-        self.work += missing.len() / 4;
-        reached
+    }
+
+    /// Makes an applicable operator the supporter of the facts that it is the first to reach.
+    fn support(&mut self, operator: u32, queue: &mut Vec<u32>) {
+        for fact in self.adds(operator) {
+            if self.supporters[fact as usize] == NEVER {
+                self.supporters[fact as usize] = operator;
+                queue.push(fact);
+            }
+        }
+    }
+
+    /// Finds the facts that the delete relaxation cannot reach if `without` never become true: all that
+    /// depend on them by their supporters are lost, and those with another achiever come back
+    /// (delete and rederive; Gupta, Mumick and Subrahmanian 1993).
+    fn lose(&mut self, without: &[u32]) {
+        for fact in std::mem::take(&mut self.lost) {
+            self.regain(fact);
+        }
+        self.lost.extend(without.iter().filter(|&&fact| self.supporters[fact as usize] != NEVER));
+        self.lost.iter().for_each(|&fact| self.is_lost[fact as usize] = true);
+        let mut next = 0;
+        while let Some(&fact) = self.lost.get(next) {
+            next += 1;
+            let needed_by = self.needed_by.get(fact as usize);
+            self.work += needed_by.len() + 1;
+            for &operator in needed_by {
+                self.lacking[operator as usize] += 1;
+                if self.lacking[operator as usize] > 1 {
+                    continue;
+                }
+                for fact in self.adds(operator) {
+                    let depends = self.supporters[fact as usize] == operator;
+                    if depends && !std::mem::replace(&mut self.is_lost[fact as usize], true) {
+                        self.lost.push(fact);
+                    }
+                }
+            }
+        }
+        let mut found: Vec<u32> = Vec::new();
+        for &fact in self.lost.iter().filter(|fact| !without.contains(fact)) {
+            let achievers = self.achievers.get(fact as usize);
+            self.work += achievers.len();
+            if achievers.iter().any(|&operator| self.lacking[operator as usize] == 0) {
+                found.push(fact);
+            }
+        }
+        while let Some(fact) = found.pop() {
+            if !self.is_lost[fact as usize] {
+                continue;
+            }
+            for operator in self.regain(fact) {
+                found.extend(self.adds(operator).filter(|fact| !without.contains(fact)));
+            }
+        }
+        let is_lost = &self.is_lost;
+        self.lost.retain(|&fact| is_lost[fact as usize]);
+    }
+
+    /// Makes a lost fact reachable again; returns the operators that this makes applicable.
+    fn regain(&mut self, fact: u32) -> Vec<u32> {
+        self.is_lost[fact as usize] = false;
+        let needed_by = self.needed_by.get(fact as usize);
+        self.work += needed_by.len();
+        let lacking = &mut self.lacking;
+        let applicable = needed_by.iter().copied().filter(|&operator| {
+            lacking[operator as usize] -= 1;
+            lacking[operator as usize] == 0
+        });
+        applicable.collect()
     }
 }
 

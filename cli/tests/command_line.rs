@@ -297,6 +297,7 @@ fn the_portfolio_is_printed() {
         .expect("a list")
         .iter()
         .map(|c| c["name"].as_str().expect("a name"));
+    check(&["plan", "a.pddl", "b.pddl", "--without", "nothing"], 2, &["expected one of: lookahead-costs, "]);
     assert!(names.clone().count() > 3 && names.into_iter().all(|name| said.contains(name)), "{said}");
 }
 

@@ -28,6 +28,7 @@ pub mod semantics;
 mod solve;
 pub mod state;
 pub mod task;
+mod technique;
 #[doc(hidden)]
 pub mod temporal;
 #[doc(hidden)]
@@ -50,4 +51,5 @@ pub use solve::optimal::plan_optimally;
 pub use solve::plan;
 pub use state::State;
 pub use task::Task;
+pub use technique::{TECHNIQUES, Technique, Without};
 pub use validate::{Broken, Cause, Moment, SEPARATION_S, Unmet, Verdict, after, endless, monitor, validate};

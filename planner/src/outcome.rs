@@ -9,6 +9,7 @@ use crate::attachment::{AttachmentError, CallStatistics};
 use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::Explanation;
 use crate::plan::Plan;
+use crate::technique::Without;
 
 /// Options of planning.
 #[derive(Debug, Clone, Default)]
@@ -35,6 +36,8 @@ pub struct Options {
     /// for any number unless a limit is reached. One is used if states or the searches' memory are
     /// limited.
     pub threads: Option<NonZeroUsize>,
+    /// Techniques that are left out, for ablation studies.
+    pub without: Without,
 }
 
 /// Statistics of one planning call.

@@ -389,6 +389,7 @@ fn limits(options: &Options, memory: MemoryLimit) -> Limits {
         evaluations: options.evaluation_limit.unwrap_or(u64::MAX),
         memory,
         seed: options.seed,
+        without: options.without,
     }
 }
 

@@ -22,3 +22,4 @@ mod timed_literals;
 mod unit;
 mod unsolvable;
 mod validating;
+mod without;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// From below. What is written, its reader and how it is walked over know each other.
 const LAYERS: [&str; 13] = [
-    "attachment clauses diagnostic grouped memory",
+    "attachment clauses diagnostic grouped memory technique",
     "plan",
     "model pddl task",
     "state",

@@ -49,6 +49,9 @@ pub struct Arguments {
     /// Decides every choice that is left open
     #[arg(long, default_value_t = 0, value_parser = input::seed, allow_negative_numbers = true)]
     seed: u64,
+    /// Leave a technique out, for ablation studies; may be given several times
+    #[arg(long, value_name = "TECHNIQUE", value_parser = technique)]
+    without: Vec<descry_planner::Technique>,
     /// Write the plan to a file (with --anytime, each better one replaces it)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -63,6 +66,14 @@ pub struct Arguments {
     json: bool,
     #[command(flatten)]
     attachments: AttachmentArguments,
+}
+
+/// Technique by its name.
+fn technique(name: &str) -> Result<descry_planner::Technique, String> {
+    descry_planner::Technique::named(name).ok_or_else(|| {
+        let names: Vec<&str> = descry_planner::TECHNIQUES.iter().map(|(_, name, _)| *name).collect();
+        format!("expected one of: {}", names.join(", "))
+    })
 }
 
 /// Outcome of planning, as printed in JSON.
@@ -96,6 +107,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
         first: arguments.first,
         seed: arguments.seed,
         threads: arguments.threads,
+        without: arguments.without.iter().copied().collect(),
         memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
         memory_used: used_bytes().map(|_| (|| used_bytes().unwrap_or(0)) as fn() -> u64),
         ..descry_planner::Options::default()
@@ -202,11 +214,14 @@ fn bounded(task: &Task, bound: f64) -> String {
 /// Prints the configurations of the portfolio, and the rounds in which they run.
 fn portfolio(as_json: bool) -> Result<Exit, CommandError> {
     use descry_planner::portfolio::{PORTFOLIO, ROUND_FACTOR, ROUNDS, SHORT_SHARE};
-    let names = |round: &[usize]| -> Vec<&str> { round.iter().map(|&place| PORTFOLIO[place].name).collect() };
+    let names = |round: &[usize]| -> Vec<&str> {
+        round.iter().map(|&place| PORTFOLIO[place].technique.name()).collect()
+    };
     let rounds: Vec<Vec<&str>> = ROUNDS.iter().map(|round| names(round)).collect();
     if as_json {
         let said = json!({
             "configurations": PORTFOLIO,
+            "techniques": descry_planner::TECHNIQUES.map(|(_, name, what)| json!({"name": name, "description": what})),
             "rounds": rounds,
             "short_round_divisor": SHORT_SHARE,
             "round_factor": ROUND_FACTOR,
@@ -228,6 +243,10 @@ fn portfolio(as_json: bool) -> Result<Exit, CommandError> {
             ),
         };
         input::print_text(&format!("{when}; {share:.0} % each: {}", round.join(" · ")))?;
+    }
+    input::print_text("techniques, each of which `--without` leaves out:")?;
+    for (_, name, what) in descry_planner::TECHNIQUES {
+        input::print_text(&format!("{name:17} {what}"))?;
     }
     Ok(Exit::Done)
 }
@@ -259,7 +278,7 @@ fn told(configuration: &descry_planner::portfolio::Configuration) -> String {
     };
     format!(
         "{:17} {engine}; {proof}{}",
-        configuration.name,
+        configuration.technique.name(),
         yes(configuration.is_capped, "; work capped a turn")
     )
 }

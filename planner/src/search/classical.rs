@@ -32,6 +32,7 @@ pub(crate) fn plan_classical(
         evaluation_limit: options.evaluation_limit,
         threads: options.threads,
         first_work: FIRST_WORK,
+        without: options.without,
     };
     let mut statistics = Statistics { actions: grounded.actions.len() as u64, ..Statistics::default() };
     let mut best = None;

@@ -9,6 +9,8 @@ use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::successor::Successors;
 use crate::heuristics::relaxed::{Counting, Relaxed};
 
+use crate::technique::{Technique, Without};
+
 use super::lookahead::Lookahead;
 use super::store::{NO_STATE, Store};
 
@@ -43,6 +45,8 @@ pub struct Improve<'a> {
     /// Work done so far (see [`Relaxed::work`]).
     work: u64,
     work_limit: u64,
+    /// Techniques that are left out.
+    pub without: Without,
 }
 
 impl<'a> Improve<'a> {
@@ -70,6 +74,7 @@ impl<'a> Improve<'a> {
             evaluation_limit: u64::MAX,
             work: 0,
             work_limit: 0,
+            without: Without::default(),
         }
     }
 
@@ -103,11 +108,11 @@ impl<'a> Improve<'a> {
         let mut round = 0usize;
         while idle < 6 && !self.over() {
             let before = self.cost(plan);
-            if self.task.axiom_heads.is_empty() {
+            if self.task.axiom_heads.is_empty() && self.without.uses(Technique::BlockReordering) {
                 self.rearrange(plan, round);
             }
             let mut size = SMALLEST_WINDOW << (round % 2);
-            while size < plan.len() * 2 && !self.over() {
+            while self.without.uses(Technique::Windows) && size < plan.len() * 2 && !self.over() {
                 self.windows(plan, size, evaluations, round % 3 == 2);
                 tell(self, plan);
                 size *= 2;
@@ -134,6 +139,9 @@ impl<'a> Improve<'a> {
     /// Action elimination: removes a step, with all later ones that are then inapplicable, if the goal
     /// is still reached.
     fn eliminate(&mut self, plan: &mut Vec<u32>) {
+        if !self.without.uses(Technique::Elimination) {
+            return;
+        }
         let task = self.task;
         let mut state = task.initial.clone();
         let mut i = 0;

@@ -26,6 +26,8 @@ pub(crate) struct Strategy {
     pub counting: Counting,
     /// True to try states along relaxed plans as well.
     pub lookahead: bool,
+    /// True for lookahead that changes numbers towards conditions.
+    pub steers: bool,
     /// True if ties go to the newest entry (LIFO), false if to the oldest (FIFO).
     pub newest: bool,
     /// True to use further open lists, ordered by the landmark count.
@@ -167,7 +169,7 @@ impl<'a, 's> Search<'a, 's> {
             stopped: false,
             store: Store::new(task),
             relaxed: Relaxed::new(task, strategy.counting),
-            lookahead: Lookahead::new(task),
+            lookahead: Lookahead::new(task).steering(strategy.steers),
             lists: Default::default(),
             best: [u32::MAX; 2],
             status: Status::new(shared.landmarks),

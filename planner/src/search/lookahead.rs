@@ -24,6 +24,8 @@ pub struct Lookahead {
     pub(super) movers: Lists<(u32, f64)>,
     /// Operators applied by the last run, in order.
     pub plan: Vec<u32>,
+    /// True to change numbers towards conditions.
+    pub steers: bool,
 }
 
 /// Maximum number of steps of a lookahead.
@@ -46,7 +48,13 @@ impl Lookahead {
             next: Vec::new(),
             movers: movers(task),
             plan: Vec::new(),
+            steers: true,
         }
+    }
+
+    /// This lookahead, with or without changing numbers towards conditions.
+    pub(super) fn steering(self, steers: bool) -> Lookahead {
+        Lookahead { steers, ..self }
     }
 
     /// Applies as much of a relaxed plan as possible from a state; leaves the applied operators in
@@ -69,14 +77,16 @@ impl Lookahead {
         relaxed.iter().for_each(|r| count(&mut self.needed, task, r.operator, 1));
         loop {
             while self.pass(task) {}
-            if self.rest.is_empty() || !(self.mend(task) || self.steer(task)) {
+            if self.rest.is_empty() || !(self.mend(task) || self.steers && self.steer(task)) {
                 break;
             }
         }
         for list in [&self.rest, &self.moves, &self.refills] {
             list.iter().for_each(|left| count(&mut self.needed, task, left.operator, -1));
         }
-        self.steer_to_goal(task);
+        if self.steers {
+            self.steer_to_goal(task);
+        }
     }
 
     /// Applies every applicable operator of the relaxed plan in order; true if any was applied.

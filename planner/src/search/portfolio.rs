@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::technique::Technique;
+
 /// Algorithm of a search in the portfolio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "engine")]
@@ -44,8 +46,9 @@ pub enum Proof {
 /// One search of the portfolio.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Configuration {
-    /// Name of the search.
-    pub name: &'static str,
+    /// Name of the search, by which it can be left out.
+    #[serde(rename = "name")]
+    pub technique: Technique,
     /// Search algorithm.
     #[serde(flatten)]
     pub engine: Engine,
@@ -57,7 +60,7 @@ pub struct Configuration {
 }
 
 const fn lazy(
-    name: &'static str,
+    technique: Technique,
     costs: bool,
     lookahead: bool,
     newest_first: bool,
@@ -65,30 +68,30 @@ const fn lazy(
 ) -> Configuration {
     let engine = Engine::LazyGreedy { costs, lookahead, newest_first, prefers_landmarks };
     let proof = if lookahead { Proof::UnsolvableWithoutBound } else { Proof::Unsolvable };
-    Configuration { name, engine, proof, is_capped: false }
+    Configuration { technique, engine, proof, is_capped: false }
 }
 
 /// Searches of the portfolio. Only the first one counts operator costs, because preferring cheap
 /// operators can mislead.
 pub const PORTFOLIO: [Configuration; 7] = [
-    lazy("lookahead, costs", true, true, false, true),
-    lazy("lookahead, LIFO", false, true, true, true),
+    lazy(Technique::LookaheadCosts, true, true, false, true),
+    lazy(Technique::LookaheadLifo, false, true, true, true),
     Configuration {
-        name: "width",
+        technique: Technique::Width,
         engine: Engine::Width { prunes: false },
         proof: Proof::UnsolvableWithoutBound,
         is_capped: false,
     },
-    lazy("plain", false, false, false, false),
-    lazy("plain, LIFO", false, false, true, true),
+    lazy(Technique::Plain, false, false, false, false),
+    lazy(Technique::PlainLifo, false, false, true, true),
     Configuration {
-        name: "narrow width",
+        technique: Technique::NarrowWidth,
         engine: Engine::Width { prunes: true },
         proof: Proof::Nothing,
         is_capped: true,
     },
     Configuration {
-        name: "satisfiability",
+        technique: Technique::Satisfiability,
         engine: Engine::Satisfiability,
         proof: Proof::Nothing,
         is_capped: true,

@@ -12,6 +12,7 @@ use crate::ground::GroundTask;
 use crate::heuristics::landmarks::Landmarks;
 use crate::heuristics::relaxed::Counting;
 use crate::memory::MemoryLimit;
+use crate::technique::{Technique, Without};
 
 use super::abreast::in_order;
 use super::horizon;
@@ -41,6 +42,8 @@ pub struct ClassicalOptions {
     pub threads: Option<NonZeroUsize>,
     /// Work of the first search before another one is tried; the limit grows in later rounds.
     pub first_work: u64,
+    /// Techniques that are left out.
+    pub without: Without,
 }
 
 /// Result of classical planning.
@@ -132,6 +135,7 @@ const GREEDY: Strategy = Strategy {
     weight: None,
     counting: Counting::CostAndSteps,
     lookahead: true,
+    steers: true,
     newest: false,
     landmarks: true,
     towards_landmarks: true,
@@ -155,7 +159,7 @@ enum Kept<'a, 's> {
 }
 
 impl<'a, 's> Kept<'a, 's> {
-    fn new(shared: &'s Shared<'a>, place: usize, bound: u32) -> Self {
+    fn new(shared: &'s Shared<'a>, place: usize, bound: u32, without: Without) -> Self {
         match PORTFOLIO[place].engine {
             Engine::Width { prunes } => {
                 Kept::Novelty(Box::new(novelty::NoveltySearch::new(shared, bound, prunes)))
@@ -164,7 +168,18 @@ impl<'a, 's> Kept<'a, 's> {
             Engine::LazyGreedy { costs, lookahead, newest_first, prefers_landmarks } => {
                 let counting = if costs { GREEDY.counting } else { Counting::Steps };
                 let (newest, towards_landmarks) = (newest_first, prefers_landmarks);
-                let strategy = Strategy { bound, lookahead, newest, counting, towards_landmarks, ..GREEDY };
+                let landmarks = without.uses(Technique::LandmarkCount);
+                let steers = without.uses(Technique::NumericLookahead);
+                let strategy = Strategy {
+                    bound,
+                    lookahead,
+                    newest,
+                    counting,
+                    towards_landmarks,
+                    landmarks,
+                    steers,
+                    ..GREEDY
+                };
                 Kept::Lazy(Box::new(lazy::Search::new(shared, strategy)))
             }
         }
@@ -231,7 +246,7 @@ impl<'a, 's> Run<'a, 's> {
         }
         let budget = LEAST_WORK + WORK_PER_OPERATOR * self.task.operators() as u64;
         let mut plan = plan;
-        if plain_too {
+        if plain_too && self.options.without.uses(Technique::SecondSearch) {
             let bound = self.bound.min(self.task.search_cost(&plan));
             // Lookahead over numbers goes the longer ways.
             let work_limit = if self.task.numbers.is_empty() { budget / 2 } else { budget };
@@ -267,7 +282,12 @@ impl<'a, 's> Run<'a, 's> {
         let (mut round, mut turn) = (0, 0);
         let mut work_limit = self.options.first_work / SHORT_SHARE;
         loop {
-            let order = turns(round);
+            let uses = |place: usize| self.options.without.uses(PORTFOLIO[place].technique);
+            let order: Vec<usize> = turns(round).iter().copied().filter(|&place| uses(place)).collect();
+            let is_over = |place| !uses(place) || matches!(kept[place], Some(Kept::Spent));
+            if (0..PORTFOLIO.len()).all(is_over) {
+                return Err(ClassicalEnd::Stopped);
+            }
             let mut next = 0;
             while next < order.len() {
                 let places = &order[self.side_by_side(next, order.len())];
@@ -326,7 +346,9 @@ impl<'a, 's> Run<'a, 's> {
         let evaluations = limit.saturating_sub(self.counts.evaluated);
         let mut jobs = Vec::new();
         for &place in places {
-            let mut search = kept[place].take().unwrap_or_else(|| Kept::new(self.shared, place, self.bound));
+            let mut search = kept[place]
+                .take()
+                .unwrap_or_else(|| Kept::new(self.shared, place, self.bound, self.options.without));
             let memory = self.shared.memory.beside(kept.iter().flatten().map(Kept::bytes).sum());
             let most = if PORTFOLIO[place].is_capped { self.options.first_work } else { u64::MAX };
             let work = work.min(most);
@@ -359,6 +381,7 @@ impl<'a, 's> Run<'a, 's> {
     /// ended because nothing got better.
     fn improve(&mut self, mut plan: Vec<u32>, work: u64) -> bool {
         let mut improve = Improve::new(self.task, self.shared.successors, self.shared.stop);
+        improve.without = self.options.without;
         improve.evaluation_limit =
             self.options.evaluation_limit.unwrap_or(u64::MAX).saturating_sub(self.counts.evaluated);
         let anytime = self.options.anytime;

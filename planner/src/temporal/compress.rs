@@ -13,6 +13,8 @@ use crate::ground::{
 use crate::memory::MemoryLimit;
 use crate::search::run::{ClassicalOptions, FIRST_WORK, solve};
 
+use crate::technique::Without;
+
 use super::advance::{Part, TemporalStep};
 use super::space::Space;
 use super::world::{Act, DurationRange, NOTHING, World};
@@ -24,6 +26,7 @@ pub fn classical_plan(
     space: &Space,
     memory: MemoryLimit,
     evaluations: u64,
+    without: Without,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<(Vec<TemporalStep>, u64, u64)> {
     let (task, parts) = compressed(space)?;
@@ -39,6 +42,7 @@ pub fn classical_plan(
         evaluation_limit: Some(if space.tight { evaluations.min(MOST_EVALUATED) } else { evaluations }),
         threads: None,
         first_work: FIRST_WORK,
+        without,
     };
     // The first plan is enough: what is cheap one after the other need not be quick side by side.
     let found = AtomicBool::new(false);

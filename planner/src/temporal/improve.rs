@@ -11,6 +11,7 @@ use std::collections::BTreeSet;
 use crate::calls::Failure;
 use crate::ground::Earns;
 use crate::memory::MemoryLimit;
+use crate::technique::{Technique, Without};
 
 use super::advance::{Part, Situation, TemporalStep};
 use super::compress::classical_plan;
@@ -43,6 +44,8 @@ pub(crate) struct Limits {
     pub memory: MemoryLimit,
     /// Seed of all random choices.
     pub seed: u64,
+    /// Techniques that are left out.
+    pub without: Without,
 }
 
 /// Progress of the search, and the reason why it ended.
@@ -111,10 +114,11 @@ pub(crate) fn search_plans(
     let (inside, all) = (envelopes(world), all_apart(world));
     // What the searches before leave out, the last one looks at.
     let mut passes = vec![Pass::new(&all, false), Pass::new(&all, true)];
-    if inside != all {
+    if inside != all && limits.without.uses(Technique::Envelopes) {
         passes.insert(0, Pass::new(&inside, false));
     }
-    let linear = world.chooses_numbers() && is_linear(world);
+    let linear =
+        limits.without.uses(Technique::LinearPrograms) && world.chooses_numbers() && is_linear(world);
     if linear && !world.chooses_without_end() {
         // Times that are tried serve most tasks: linear programs choose them before the others are searched at length.
         let short = [&inside, &all].map(|apart| Pass { is_short: true, ..Pass::new(apart, false) });
@@ -329,7 +333,10 @@ impl Run<'_, '_, '_> {
         // length.
         let short =
             (FIRST_WORK / (self.space.world.acts.len() as u64).max(1)).clamp(FIRST_TRY.0, FIRST_TRY.1);
-        for eager in [false, true] {
+        for (eager, technique) in [(false, Technique::SparseLookahead), (true, Technique::EagerLookahead)] {
+            if !self.limits.without.uses(technique) {
+                continue;
+            }
             let manner = Manner { eager, ..self.manner(None, self.space.counts_time(), short) };
             let end = self.search(None, manner)?;
             if self.took(end)? {
@@ -338,8 +345,9 @@ impl Run<'_, '_, '_> {
         }
         let left = self.limits.evaluations.saturating_sub(self.progress.counts.evaluated);
         if self.at_once == 1
+            && self.limits.without.uses(Technique::Compression)
             && let Some((steps, evaluated, work)) =
-                classical_plan(self.space, self.limits.memory, left, self.stop)
+                classical_plan(self.space, self.limits.memory, left, self.limits.without, self.stop)
         {
             self.progress.counts.evaluated += evaluated;
             self.progress.counts.work += work;
@@ -392,9 +400,12 @@ impl Run<'_, '_, '_> {
         if self.limits.first {
             return self.keep((measured, steps, base), found);
         }
-        let shorter = shortened(self.space, (measured, steps, base), self.stop)?;
-        let shorter = self.rearranged(shorter)?;
-        let plan = tightened(self.space, shorter, self.stop)?;
+        let uses = |technique| self.limits.without.uses(technique);
+        let plan = (measured, steps, base);
+        let shorter = if uses(Technique::Shortcuts) { shortened(self.space, plan, self.stop)? } else { plan };
+        let shorter = if uses(Technique::Tours) { self.rearranged(shorter)? } else { shorter };
+        let plan =
+            if uses(Technique::Tightening) { tightened(self.space, shorter, self.stop)? } else { shorter };
         self.keep(plan, found)
     }
 
@@ -463,6 +474,9 @@ impl Run<'_, '_, '_> {
         let share = (least / 3).clamp(50, 3000);
         let mut proven = false;
         for weight in WEIGHTS.map(Some) {
+            if !self.limits.without.uses(Technique::Restarts) {
+                break;
+            }
             if self.progress.counts.evaluated >= budget || self.progress.counts.work >= self.work {
                 return Ok(());
             }
@@ -489,6 +503,9 @@ impl Run<'_, '_, '_> {
         }
         if proven {
             return self.ended(Reason::Exhausted);
+        }
+        if !self.limits.without.uses(Technique::Neighbourhoods) {
+            return Ok(());
         }
         self.neighbourhoods(budget)
     }

@@ -21,7 +21,7 @@ mod search_improve;
 mod search_lookahead;
 mod search_novelty;
 mod search_run;
-mod small;
+pub mod small;
 mod temporal_compress;
 mod temporal_direction;
 mod temporal_envelope;

@@ -39,6 +39,7 @@ fn check(tiles: [usize; 9], anytime: bool, first_work: u64, solvable: bool) {
     let ground = puzzle(tiles);
     let run = |threads: usize| {
         let options = ClassicalOptions {
+            without: Default::default(),
             only_first: false,
             anytime,
             soft: false,

@@ -24,7 +24,7 @@ fn in_space<R>(domain: &str, problem: &str, look: impl FnOnce(&Task, &Space) -> 
 #[test]
 fn a_start_and_its_end_enclose_what_needs_them() {
     let found = in_space(small::CELLAR, small::FUSES, |_, space| {
-        classical_plan(space, MemoryLimit::new(None, None), 1000, &|| false)
+        classical_plan(space, MemoryLimit::new(None, None), 1000, Default::default(), &|| false)
     });
     let (steps, _, _) = found.expect("the classical search finds a plan");
     let parts: Vec<Part> = steps.iter().map(|step| step.part).collect();

@@ -8,6 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::Improve;
 use crate::classical::compiled::Compiled;
+use crate::technique::Technique;
 
 /// Maximum number of steps of one operator that are removed together.
 const MOST_TOGETHER: u32 = 6;
@@ -81,6 +82,9 @@ fn balance(one: &[f64], other: &[f64]) -> Option<(usize, usize)> {
 impl Improve<'_> {
     /// Removes steps of a plan that cancel each other.
     pub(super) fn undo(&mut self, plan: &mut Vec<u32>) {
+        if !self.without.uses(Technique::Cancelling) {
+            return;
+        }
         let task = self.task;
         if task.numbers.is_empty() || plan.len().saturating_mul(task.initial.len()) > MOST_WORDS {
             return;

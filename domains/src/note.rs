@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::english::{self, percent};
+use crate::looking::contradiction::Contradiction;
 
 /// News from an update of the world model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -93,6 +94,9 @@ pub enum Note {
         /// True if the view is dropped for good; otherwise, further views may make it usable.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         is_left_out: bool,
+        /// Contradiction for which the looks are not believed, if that is the reason.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        contradiction: Option<Contradiction>,
     },
 }
 

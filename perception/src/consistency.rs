@@ -11,6 +11,7 @@ mod sight;
 use crate::view::View;
 use fit::Fit;
 use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 use sight::Sight;
 use std::fmt;
 
@@ -44,7 +45,8 @@ pub struct MapSurface {
 }
 
 /// A fault of the camera or of the poses, common to all looks.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Fault {
     /// Measured depth is the true depth times this factor.
     DepthScale(f64),

@@ -93,6 +93,7 @@ pub(super) fn prove_nothing(
     belief.tracks.sort_by_key(|track| track.id);
     put(eyes.record, "belief", eyes.robot.now_ns(), &*mind.known.belief)?;
     let because = contradiction.told(&name);
-    notes.push(Note::Nothing { because, advice: String::new(), is_left_out: false });
+    let contradiction = Some(contradiction);
+    notes.push(Note::Nothing { because, advice: String::new(), is_left_out: false, contradiction });
     Ok(())
 }

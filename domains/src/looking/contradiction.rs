@@ -1,9 +1,11 @@
 //! Contradictions between views and the map.
 
 use descry_perception::consistency::Fault;
+use serde::{Deserialize, Serialize};
 
 /// Reason why the views of a surface prove nothing.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Contradiction {
     /// Fault of the camera or of the poses.
     Fault(Fault),

@@ -45,7 +45,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     place_looks(mind, eyes, on, (&options, &seeking.surface))?;
     if !keep_placed(&mut mind.regions[on].looks) {
         let because = format!("the {} cannot be made out in this view", mind.known.surfaces[on].name);
-        notes.push(Note::Nothing { because, advice: String::new(), is_left_out: true });
+        notes.push(Note::Nothing { because, advice: String::new(), is_left_out: true, contradiction: None });
         return Ok(());
     }
     let views = restore(mind, eyes, on)?;
@@ -58,7 +58,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
             // What to set otherwise is for who programs it.
             let (because, advice) = because.split_once(": ").unwrap_or((&because, ""));
             mind.regions[on].nothing = Some(because.to_string());
-            notes.push(Note::Nothing { because: because.into(), advice: advice.into(), is_left_out: false });
+            let (because, advice) = (because.to_string(), advice.to_string());
+            notes.push(Note::Nothing { because, advice, is_left_out: false, contradiction: None });
             return Ok(());
         }
     };
@@ -79,7 +80,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
             return perceive(mind, eyes, on, notes);
         }
         let because = format!("this view does not fit the others of the {}", mind.known.surfaces[on].name);
-        notes.push(Note::Nothing { because, advice: String::new(), is_left_out: true });
+        notes.push(Note::Nothing { because, advice: String::new(), is_left_out: true, contradiction: None });
         return Ok(());
     }
     let merged = merging::without_walls(&mind.known.surfaces[on], merged);

@@ -99,7 +99,8 @@ fn why_it_is_no_surer_is_said() {
     // The view failed.
     let failed = perceived(&[(2, "left out: it contradicts")]);
     check(&begin, &empty, failed, &["this view of the table could not be used"], "");
-    let nothing = Note::Nothing { because: "no plane".into(), advice: String::new(), is_left_out: false };
+    let because = "no plane".into();
+    let nothing = Note::Nothing { because, advice: String::new(), is_left_out: false, contradiction: None };
     check(
         &begin,
         &begin,

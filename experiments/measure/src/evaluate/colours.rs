@@ -1,14 +1,13 @@
 //! Colours under changing light: what a search for a thing of a colour answers while it is there and while only others are,
 //! which names colours get, and how far their probabilities are to be trusted.
 
+use super::room::{self, Answer, STRIDE};
 use super::searching::Search;
 use descry_domains::load::Domain;
-use descry_domains::reasons;
-use descry_domains::situation::Situation;
 use descry_perception::calibration::{Claim, reliability};
 use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::Colour;
-use descry_robots::sim::{Object, SceneSpec, SimOptions, arrange};
+use descry_robots::sim::{SceneSpec, SimOptions};
 
 /// Paints of each colour. From: colours that CSS names so, or as a shade of it; another source than that of the recogniser's ranges.
 const PAINTS: [(&str, &[[u8; 3]]); 11] = [
@@ -26,19 +25,8 @@ const PAINTS: [(&str, &[[u8; 3]]); 11] = [
 ];
 /// Looks that a search may take.
 const LOOKS: usize = 6;
-/// Each pose is this many places further along the ring than the one before.
-const STRIDE: usize = 3;
-/// Greatest distance between a thing and where it is said to stand, metres.
-const FOUND_M: f64 = 0.05;
 
-const ROOM: &str = r#"
-title = "A cup, two mugs and a carton under some light"
-[[surface]]
-name = "table"
-size_m = [1.6, 0.8]
-height_m = 0.72
-[start]
-position_m = [-1.4, 0.0]
+const LIGHT_AND_OBJECTS: &str = r#"
 [light]
 gain = [0.5, 1.3]
 cast = 0.12
@@ -58,15 +46,6 @@ name = "carton"
 shape.box = { size_m = [0.10, 0.06, 0.20] }
 colour = [190, 170, 60]
 "#;
-
-/// Answers to searches: found, cannot tell, not there, and found elsewhere or while it is not there.
-#[derive(Clone, Copy)]
-enum Answer {
-    Found,
-    CannotTell,
-    NotThere,
-    Wrong,
-}
 
 /// Names that tracks got: by true and likeliest name, and each probability with its truth.
 #[derive(Default)]
@@ -90,9 +69,8 @@ pub fn run(count: u64, first: u64) -> Result<(), String> {
             ..mug.clone()
         });
     }
-    let spec = SceneSpec::parse("colours", ROOM).map_err(|e| e.to_string())?;
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| e.to_string())?;
+    let spec = room::spec("A cup, two mugs and a carton under some light", LIGHT_AND_OBJECTS)?;
+    let runtime = room::runtime()?;
     let mut named = Named::default();
     println!("{:>22} {:>6} {:>11} {:>9} {:>6}", "", "found", "cannot tell", "not there", "wrong");
     for (what, domain) in [("cup", &domain), ("mug by colour alone", &mugs)] {
@@ -103,8 +81,7 @@ pub fn run(count: u64, first: u64) -> Result<(), String> {
                     .block_on(one(domain, &spec, (what, seed, present), &mut named))
                     .map_err(|e| format!("{what} {seed}: {e}"))?;
                 answers[answer as usize] += 1;
-                let is_right = matches!((answer, present), (Answer::Found, true) | (Answer::NotThere, false));
-                if !is_right {
+                if !answer.is_right(present) {
                     eprintln!("{what} {seed}, there {present}: {words}");
                 }
             }
@@ -147,7 +124,7 @@ async fn one(
     (what, seed, present): (&str, u64, bool),
     named: &mut Named,
 ) -> Result<(Answer, String), String> {
-    let mut scene = (0..20).find_map(|n| arrange(spec, seed + n * 1_000_003).ok()).ok_or("no arrangement")?;
+    let mut scene = room::arranged(spec, seed)?;
     let is_cup = what == "cup";
     let asked = if is_cup { seed as usize % PAINTS.len() } else { 3 };
     // Any colour but the one that is asked for, and another than the last.
@@ -158,7 +135,7 @@ async fn one(
     for (object, colour) in scene.objects.iter_mut().zip(colours) {
         let paints = PAINTS[colour].1;
         object.colour = paints[(seed / 7) as usize % paints.len()];
-        truth.push((colour, foot(object)));
+        truth.push((colour, room::in_map(object, [0.0; 3])));
     }
     let place_m = present.then(|| truth[usize::from(!is_cup)].1);
     let goal = if is_cup { format!("find the {} cup", PAINTS[asked].0) } else { "find the red mug".into() };
@@ -168,14 +145,14 @@ async fn one(
     let choose = |poses: &[String]| STRIDE % poses.len();
     let heard = search
         .run(choose, |s| {
-            let answer = heard(s, place_m);
-            last = Some((words(s, &goal), s.belief.tracks.clone()));
+            let answer = Answer::of(s, place_m);
+            last = Some((format!("{goal}: {}", room::believed(s)), s.belief.tracks.clone()));
             (answer, !matches!(answer, Answer::CannotTell))
         })
         .await?;
     let (words, tracks) = last.ok_or("no look")?;
     for (colour, at) in truth {
-        let near = tracks.iter().find(|t| (t.position_m.xy() - at.xy()).norm() < FOUND_M);
+        let near = tracks.iter().find(|t| room::is_at(&t.position_m, &at));
         let Some(track) = near.filter(|t| !t.colours.is_empty()) else { continue };
         let several = 1.0 - track.colours.iter().map(|(_, p)| p).sum::<f64>();
         let all: Vec<f64> = track.colours.iter().map(|(_, p)| *p).chain([several]).collect();
@@ -186,34 +163,4 @@ async fn one(
             .extend(track.colours.iter().zip(PAINTS).map(|((_, p), (n, _))| (*p, n == PAINTS[colour].0)));
     }
     Ok((heard.last().copied().unwrap_or(Answer::CannotTell), words))
-}
-
-/// Middle of the foot of an object in the map, metres.
-fn foot(object: &Object) -> Point3<f64> {
-    object.map_from_object * Point3::origin()
-}
-
-fn heard(s: &Situation, place_m: Option<Point3<f64>>) -> Answer {
-    if s.confidence(0) >= s.threshold {
-        let p = |t: &&descry_memory::belief::Track| s.things[0].probability(t, &s.surfaces);
-        let best = s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
-        let off_m = best.zip(place_m).map(|(t, at)| (t.position_m.xy() - at.xy()).norm());
-        return if off_m.is_some_and(|m| m < FOUND_M) { Answer::Found } else { Answer::Wrong };
-    }
-    if reasons::left_about(s, 0).is_none() { Answer::NotThere } else { Answer::CannotTell }
-}
-
-/// The belief in one line.
-fn words(s: &Situation, goal: &str) -> String {
-    let track = |t: &descry_memory::belief::Track| {
-        let most = |list: &[(String, f64)]| {
-            let best = list.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            best.map_or(String::new(), |(name, p)| format!("{name} {p:.2}"))
-        };
-        let p = s.things[0].probability(t, &s.surfaces);
-        format!("it {p:.3}, {}, {}, none {:.2}", most(&t.probabilities), most(&t.colours), t.unknown)
-    };
-    let tracks: Vec<String> = s.belief.tracks.iter().map(track).collect();
-    let why = reasons::left_about(s, 0).unwrap_or_default();
-    format!("{goal}: {why} [{:.3}] {}", s.chance_there(0), tracks.join("; "))
 }

@@ -2,36 +2,22 @@
 //! while something else is there instead.
 
 use descry_domains::load::Domain;
-use descry_domains::reasons;
-use descry_domains::situation::Situation;
-use descry_memory::belief::Track;
-use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Handle, ObjectModel, Range, Shape as Form, Top};
 use descry_robots::sim::composed::{Composed, Piece};
 use descry_robots::sim::shape::{Cuboid, Cup, Cylinder, Shape};
-use descry_robots::sim::{Object, SceneSpec, SimOptions, arrange};
+use descry_robots::sim::{SceneSpec, SimOptions};
 
+use super::room::{self, Answer, STRIDE};
 use super::searching::Search;
 
 /// Looks that a search may take; all poses of the ring but the start.
 const LOOKS: usize = 8;
-/// Each pose is this many places further along the ring than the one before.
-const STRIDE: usize = 3;
-/// Maximum distance between a thing and where it is said to stand, metres.
-const FOUND_M: f64 = 0.05;
 
 /// Kinds of scenes.
 const KINDS: [&str; 11] =
     ["alone", "saucer", "tin", "bowl", "tray", "book", "box", "in a tin", "stacked", "upside down", "bottle"];
 
-const ROOM: &str = r#"
-title = "A thing on, in or under another"
-[[surface]]
-name = "table"
-size_m = [1.6, 0.8]
-height_m = 0.72
-[start]
-position_m = [-1.4, 0.0]
+const OBJECTS: &str = r#"
 [[object]]
 name = "asked"
 shape.cup = { diameter_m = 0.16, height_m = 0.25 }
@@ -121,23 +107,12 @@ fn bottle() -> ObjectModel {
     }
 }
 
-/// Answer of a search.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Answer {
-    Found,
-    CannotTell,
-    NotThere,
-    /// Found, elsewhere than where it is or while it is not there.
-    Elsewhere,
-}
-
 /// Prints a row for each kind (all without one): `count` scenes from a seed with the asked thing, and as many without it.
 pub fn run(count: u64, first: u64, only: &str) -> Result<(), String> {
     let mut domain = Domain::load("tabletop").map_err(|e| e.to_string())?;
     domain.objects.push(bottle());
-    let spec = SceneSpec::parse("composed", ROOM).map_err(|e| e.to_string())?;
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| e.to_string())?;
+    let spec = room::spec("A thing on, in or under another", OBJECTS)?;
+    let runtime = room::runtime()?;
     println!(
         "{:>12} {:>7} {:>6} {:>11} {:>15} {:>9} | {:>7} {:>10} {:>11} {:>9} | {:>6} {:>9}",
         "",
@@ -163,8 +138,7 @@ pub fn run(count: u64, first: u64, only: &str) -> Result<(), String> {
                     .map_err(|e| format!("{kind} {seed}: {e}"))?;
                 answers[n][answer as usize] += 1;
                 looks += taken;
-                let is_right = if present { Answer::Found } else { Answer::NotThere };
-                if answer != is_right {
+                if !answer.is_right(present) {
                     eprintln!("{kind} {seed}, there {present}: {words}");
                 }
             }
@@ -188,12 +162,12 @@ async fn one(
     seed: u64,
     present: bool,
 ) -> Result<(Answer, usize, String), String> {
-    let mut scene = (0..20).find_map(|n| arrange(spec, seed + n * 1_000_003).ok()).ok_or("no arrangement")?;
+    let mut scene = room::arranged(spec, seed)?;
     let target = scene.objects.iter_mut().find(|o| o.name == "asked").ok_or("nothing asked")?;
     let parts = parts(kind, present, seed);
     let at_m = parts.last().map_or([0.0; 3], |last| last.at_m);
     target.shape = Shape::Composed(Composed { parts });
-    let place_m = present.then(|| foot(target, at_m));
+    let place_m = present.then(|| room::in_map(target, at_m));
     let name = if kind == "bottle" { "bottle" } else { "cup A" };
     let options = SimOptions { seed, ..SimOptions::default() };
     let goal = format!("find {name}");
@@ -203,54 +177,14 @@ async fn one(
         .run(
             |poses| STRIDE % poses.len(),
             |situation| {
-                let answer = heard(situation, place_m);
-                last = Some(words(situation));
+                let answer = Answer::of(situation, place_m);
+                last = Some(room::believed(situation));
                 (answer, answer != Answer::CannotTell)
             },
         )
         .await?;
     let answer = heard.last().copied().unwrap_or(Answer::CannotTell);
     Ok((answer, heard.len(), last.unwrap_or_default()))
-}
-
-/// Position in the map, metres, of a part of an object.
-fn foot(object: &Object, at_m: [f64; 3]) -> Point3<f64> {
-    object.map_from_object * Point3::from(at_m)
-}
-
-fn heard(s: &Situation, place_m: Option<Point3<f64>>) -> Answer {
-    if s.confidence(0) >= s.threshold {
-        let p = |t: &&Track| s.things[0].probability(t, &s.surfaces);
-        let best = s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
-        let off_m = best.zip(place_m).map(|(t, p)| (t.position_m.x - p.x).hypot(t.position_m.y - p.y));
-        return if off_m.is_some_and(|m| m < FOUND_M) { Answer::Found } else { Answer::Elsewhere };
-    }
-    if reasons::left_about(s, 0).is_none() { Answer::NotThere } else { Answer::CannotTell }
-}
-
-/// The belief in one line.
-fn words(s: &Situation) -> String {
-    let p = |t: &Track| s.things[0].probability(t, &s.surfaces);
-    let track = |t: &Track| {
-        let best = t.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-        let best = best.map_or(String::new(), |(name, p)| format!("{name} {p:.2}"));
-        let [a, b, c] = t.size_m.map(|m| (100.0 * m).round());
-        format!(
-            "({:.2} {:.2} {:.3}) {a}x{b}x{c} it {:.3}, {best}, none {:.2}",
-            t.position_m.x,
-            t.position_m.y,
-            t.position_m.z,
-            p(t),
-            t.unknown
-        )
-    };
-    let tracks: Vec<String> = s.belief.tracks.iter().map(track).collect();
-    format!(
-        "{} [{:.3}] {}",
-        reasons::left_about(s, 0).unwrap_or_default(),
-        s.chance_there(0),
-        tracks.join("; ")
-    )
 }
 
 /// Processor time of this program so far, seconds.

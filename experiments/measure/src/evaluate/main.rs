@@ -1,6 +1,6 @@
 //! Segmentation, merging and recognition compared with ground truth, times of single views, and the origin of
 //! all constants, as tables:
-//! `cargo run --release -p descry-measure --bin evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | colours COUNT SEED | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-measure --bin evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | colours COUNT SEED | lies COUNT SEED | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod clutter;
 mod colours;
@@ -10,8 +10,10 @@ mod constants;
 mod frames;
 mod further;
 mod kitchen;
+mod lies;
 mod mismatched;
 mod mosd;
+mod room;
 #[path = "../searching.rs"]
 mod searching;
 mod surfaces;
@@ -51,6 +53,10 @@ fn main() -> ExitCode {
             (Ok(count), Ok(first)) => colours::run(count, first),
             _ => Err(format!("`{count}` and `{first}` are no number of scenes and first seed")),
         },
+        ["lies", count, first] => match (count.parse(), first.parse()) {
+            (Ok(count), Ok(first)) => lies::run(count, first),
+            _ => Err(format!("`{count}` and `{first}` are no number of recordings and first seed")),
+        },
         ["mismatched", count, seed, further @ ..] => match (count.parse(), seed.parse()) {
             (Ok(count), Ok(seed)) => {
                 let only = further.first().copied().unwrap_or_default();
@@ -68,7 +74,7 @@ fn main() -> ExitCode {
         },
         ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | colours COUNT SEED | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
+            "usage: evaluate constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | colours COUNT SEED | lies COUNT SEED | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

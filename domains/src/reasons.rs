@@ -78,12 +78,19 @@ pub fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str)
     most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {}", percent(*p)))
 }
 
-/// Sentence about a searched surface that may not be a supporting surface; `None` if there is no doubt.
+/// Sentence about a searched surface that may not be a supporting surface, or whose views may be false; `None` if there is no
+/// doubt.
 pub fn may_be_none(s: &Situation, thing: &Thing) -> Option<String> {
     let asked = s.surfaces.iter().enumerate().filter(|(n, _)| thing.may_be_on(*n));
     asked.into_iter().find_map(|(_, k)| {
-        let doubt = k.doubtful.as_ref()?;
-        Some(format!("what was taken for the {} {doubt}", k.name))
+        if let Some(doubt) = &k.doubtful {
+            return Some(format!("what was taken for the {} {doubt}", k.name));
+        }
+        let about = || {
+            let chance = percent(k.sensor_doubt);
+            format!("camera or poses of the views of the {} may have a fault ({chance})", k.name)
+        };
+        (k.sensor_doubt > s.thresholds.not_there).then(about)
     })
 }
 

@@ -33,6 +33,8 @@ pub struct KnownSurface {
     pub placed: Option<Certainty>,
     /// Displacement between the observed and the mapped surface, metres; either may be wrong.
     pub displaced_m: f64,
+    /// Probability that camera or poses of the views have a fault.
+    pub sensor_doubt: f64,
 }
 
 impl KnownSurface {

@@ -22,15 +22,21 @@ const MISFIT: f64 = 30.0;
 /// Maximum misfit of a single look, so that one gross pose error cannot suggest a common fault.
 /// From: chosen.
 const MOST_MISFIT: f64 = 150.0;
-/// Share of the statement's misfit that a named fault may leave. From: chosen.
-const LEFT_SHARE: f64 = 0.35;
 /// Minimum number of looks for a common fault; in a single look, a wrong pose looks the same.
 /// From: derived.
 const FEWEST: usize = 2;
-/// Prior probability of a camera or pose fault. From: chosen.
+/// Prior probability of a camera or pose fault; the kinds of faults share it. From: chosen.
 const PRIOR: f64 = 0.02;
-/// Probability of a fault below which the looks count as honest. From: chosen.
-const NEGLIGIBLE: f64 = 0.02;
+/// Number of kinds of faults. From: derived, those that can be named.
+const KINDS: f64 = 7.0;
+/// Standard deviations of calibration errors, if there is one: logarithms of depth scale and focal length, and principal
+/// point, pixels. From: chosen, half of the largest errors that uncalibrated depth cameras show.
+const CALIBRATION_SIGMA: f64 = 0.05;
+const PRINCIPAL_SIGMA_PX: f64 = 16.0;
+/// Factors between units of length that are confused: metres, decimetres, millimetres and inches. From: derived.
+const UNITS: [f64; 8] = [10.0, 0.1, 100.0, 0.01, 1000.0, 0.001, 1.0 / INCH_M, INCH_M];
+/// Length of an inch, metres. From: derived, by definition.
+const INCH_M: f64 = 0.0254;
 /// Maximum displacement that aligning a surface with its outline corrects, in standard deviations
 /// of the stated pose. From: chosen, as far as views are laid on an outline.
 const MENDED: f64 = 4.0;
@@ -82,6 +88,10 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = |times: f64| 100.0 * (times - 1.0).abs();
         match self {
+            Fault::DepthScale(times) if is_unit(*times) => {
+                let (times, way) = if *times > 1.0 { (*times, "long") } else { (1.0 / times, "short") };
+                write!(f, "depth reads {times:.0} times too {way}, as in another unit of length")
+            }
             Fault::DepthScale(times) => {
                 let way = if *times > 1.0 { "long" } else { "short" };
                 write!(f, "depth reads {:.0} % too {way}", percent(*times))
@@ -124,86 +134,183 @@ pub struct Inconsistency {
     pub spread_m: f64,
 }
 
-impl Inconsistency {
-    /// True if the fault is likelier than the statement.
-    pub fn is_likely(&self) -> bool {
-        self.probability > 0.5
-    }
+/// Evidence of looks at a mapped surface for and against camera and poses as stated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Consistency {
+    /// Contradiction; `None` if a fault is not likelier than the stated values.
+    pub inconsistency: Option<Inconsistency>,
+    /// Probability that camera or poses have a fault that laying the surface on its outline does not correct.
+    pub doubt: f64,
+    /// Standard deviation of places on the surface by errors of calibration that the looks allow, metres.
+    pub spread_m: f64,
 }
 
-/// Finds the fault that explains why looks at a mapped surface disagree with the map; `None` if
-/// they agree, or show too little of the surface.
+/// Poses of the looks where poses are late by a number of frames; `None` where the frame is unknown.
+pub type Late = (i64, Vec<Option<Isometry3<f64>>>);
+
+/// Weighs the faults of camera and poses that may explain why looks at a mapped surface disagree with the map.
 ///
-/// Each look is a view and its stated pose. `asked` is the number of the surface in `map`. `neighbours` has, for each number of frames by
-/// which poses may be late, the poses that the looks would have.
+/// Each look is a view and its stated pose. `asked` is the number of the surface in `map`. `neighbours` has the poses that the looks
+/// would have, were poses late.
 pub fn judge(
     looks: &[(&View, Isometry3<f64>)],
     map: &[MapSurface],
     asked: usize,
-    neighbours: &[(i64, Vec<Isometry3<f64>>)],
-) -> Option<Inconsistency> {
-    let surface = map.get(asked)?;
-    let seen = |(view, pose): &(&View, Isometry3<f64>)| Sight::of(view, pose, surface);
-    let (at, sights): (Vec<usize>, Vec<Sight>) =
-        looks.iter().enumerate().filter_map(|(n, look)| Some((n, seen(look)?))).unzip();
+    neighbours: &[Late],
+) -> Consistency {
+    let Some(surface) = map.get(asked) else { return Consistency::default() };
+    let seen = |(n, (view, pose)): (usize, &(&View, Isometry3<f64>))| {
+        Some((n, Sight::of(view, pose, surface, 1.0)?))
+    };
+    let (at, sights): (Vec<usize>, Vec<Sight>) = looks.iter().enumerate().filter_map(seen).unzip();
     let fit = Fit::new(&sights, map, asked);
-    let stated = Model::default();
-    let misfits: Vec<f64> = (0..sights.len()).map(|n| fit.misfit(n, &stated)).collect();
-    let before = total(&misfits);
-    // With less, no fault could be likelier than the statement.
-    if before < 2.0 * (1.0 / PRIOR).ln() {
-        return None;
-    }
-    let (left, model) = likeliest(&fit, &sights, before, || {
-        neighbours.iter().map(|(frames, poses)| Model {
-            poses: Some(at.iter().map(|&n| poses[n]).collect()),
-            ..Model::of(Fault::Late(*frames))
-        })
-    });
+    let misfits: Vec<f64> = (0..sights.len()).map(|n| fit.misfit(n, &Model::default())).collect();
     let wrong = misfits.iter().filter(|misfit| **misfit > MISFIT).count();
-    let is_named = left < LEFT_SHARE * before && !model.is_mended(&sights);
-    if is_named {
-        let odds = PRIOR * ((before - left) / 2.0 - model.fault.numbers() as f64).exp();
-        let (probability, spread_m) = (odds / (1.0 + odds), fit.displacement_m(&model));
-        return (probability > NEGLIGIBLE).then_some(Inconsistency {
-            fault: model.fault,
-            probability,
-            spread_m,
-        });
+    if wrong == sights.len()
+        && let Some(inconsistency) = other_unit(looks, map, asked)
+    {
+        return Consistency {
+            inconsistency: Some(inconsistency),
+            doubt: inconsistency.probability,
+            spread_m: 0.0,
+        };
     }
-    let spread_m = surface.radius_m();
-    (2 * wrong >= sights.len()).then_some(Inconsistency {
-        fault: Fault::Unexplained,
-        probability: 1.0 - NEGLIGIBLE,
-        spread_m,
+    let late = neighbours.iter().map(|(frames, poses)| Model {
+        poses: Some(at.iter().map(|&n| poses[n]).collect()),
+        ..Model::of(Fault::Late(*frames))
+    });
+    let (spread_m, explained) = explanations(&fit, &sights, &misfits, late.collect());
+    // A displacement leaves what is seen as it is, but for its place.
+    let displaced = |e: &&Explanation| matches!(e.model.fault, Fault::Displaced(..));
+    let most = explained.iter().map(|e| e.log_odds).fold(0.0, f64::max);
+    let share = |e: &Explanation| (e.log_odds - most).exp();
+    let all = (-most).exp() + explained.iter().map(share).sum::<f64>();
+    let doubt = explained.iter().filter(|e| !displaced(e)).map(share).sum::<f64>() / all;
+    let likeliest = explained.iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
+    let named =
+        likeliest.filter(|e| sights.len() >= FEWEST && !e.model.is_mended(&sights) && e.log_odds > 0.0);
+    let is_gross = 2 * wrong >= sights.len() && wrong > 0;
+    let inconsistency = match named {
+        Some(e) => {
+            let left = (0..sights.len()).filter(|&n| fit.misfit(n, &e.model) > MISFIT).count();
+            let fault = if 2 * left >= sights.len() { Fault::Unexplained } else { e.model.fault };
+            let spread_m = fit.displacement_m(&e.model, false);
+            Some(Inconsistency { fault, probability: 1.0 - (-most).exp() / all, spread_m })
+        }
+        None if is_gross => Some(Inconsistency {
+            fault: Fault::Unexplained,
+            probability: 1.0 - PRIOR,
+            spread_m: surface.radius_m(),
+        }),
+        None => None,
+    };
+    let is_unexplained = inconsistency.is_some_and(|found| found.fault == Fault::Unexplained);
+    Consistency { inconsistency, doubt: if is_unexplained { 1.0 - PRIOR } else { doubt }, spread_m }
+}
+
+/// Unit of length by which most looks show the surface where the map has it, if they do not in metres.
+fn other_unit(looks: &[(&View, Isometry3<f64>)], map: &[MapSurface], asked: usize) -> Option<Inconsistency> {
+    let agreeing = |times: f64| {
+        let sights: Vec<Sight> =
+            looks.iter().filter_map(|(view, pose)| Sight::of(view, pose, &map[asked], times)).collect();
+        let fit = Fit::new(&sights, map, asked);
+        (0..sights.len()).filter(|&n| fit.misfit(n, &Model::default()) < MISFIT).count()
+    };
+    let counts = UNITS.map(agreeing);
+    let best = (0..UNITS.len()).max_by_key(|&n| counts[n])?;
+    (2 * counts[best] > looks.len()).then_some(Inconsistency {
+        fault: Fault::DepthScale(UNITS[best]),
+        probability: 1.0 - PRIOR,
+        spread_m: map[asked].radius_m(),
     })
 }
 
-/// Fault with the minimum misfit; the stated values if none is better.
-fn likeliest<M: Iterator<Item = Model>>(
+/// True if a factor on depth is that between units of length rather than an error of calibration.
+fn is_unit(times: f64) -> bool {
+    times.ln().abs() > 2f64.ln()
+}
+
+/// A fault with its logarithmic odds against the stated values.
+#[derive(Debug)]
+struct Explanation {
+    model: Model,
+    log_odds: f64,
+}
+
+/// Standard deviation of places by calibration errors that the looks allow, metres, and the faults that may explain the looks.
+fn explanations(
     fit: &Fit<'_>,
     sights: &[Sight],
-    before: f64,
-    late: impl Fn() -> M,
-) -> (f64, Model) {
-    let mut best = (before, Model::default());
-    if sights.len() < FEWEST {
-        return best;
-    }
-    let mut misfit = |model: Model| {
-        let misfit = total(&(0..sights.len()).map(|n| fit.misfit(n, &model)).collect::<Vec<_>>());
-        if misfit < best.0 {
-            best = (misfit, model);
-        }
-        misfit
+    stated: &[f64],
+    late: Vec<Model>,
+) -> (f64, Vec<Explanation>) {
+    let before = total(stated);
+    let misfit = |model: &Model| {
+        // Where a model has no pose for a look, it explains nothing of the look.
+        let of_look = |n: usize| if model.knows(n) { fit.misfit(n, model) } else { stated[n] };
+        total(&(0..sights.len()).map(of_look).collect::<Vec<_>>())
     };
-    late().chain([Model::of(Fault::Mirrored)]).for_each(|model| {
-        misfit(model);
-    });
-    for family in Family::ALL {
-        family.search(before, &mut |fault| misfit(Model::of(fault)));
+    let prior = (PRIOR / KINDS).ln();
+    let mut found: Vec<Explanation> = Vec::new();
+    // With less, no fault could be likelier than the statement.
+    let is_promising = before > 2.0 * (1.0 / PRIOR).ln();
+    if is_promising {
+        for model in late.into_iter().chain([Model::of(Fault::Mirrored)]) {
+            let log_odds = prior + (before - misfit(&model)) / 2.0;
+            found.push(Explanation { model, log_odds });
+        }
     }
-    best
+    let mut spread_m: f64 = 0.0;
+    for family in Family::ALL {
+        let mut best = (before, [0.0; 3]);
+        if is_promising {
+            best = family.search(before, &mut |fault| misfit(&Model::of(fault)));
+        }
+        let sigmas = family.sigmas();
+        if sigmas.is_empty() {
+            let model = Model::of(family.fault(&best.1));
+            let log_odds = prior + (before - best.0) / 2.0 - model.fault.numbers() as f64;
+            found.push(Explanation { model, log_odds });
+            continue;
+        }
+        let (of_family_m, explanation) = laplace(fit, family, best, &misfit, before);
+        spread_m = spread_m.max(of_family_m);
+        found.push(explanation);
+    }
+    (spread_m, found)
+}
+
+/// Laplace approximation of a family of calibration errors about the numbers of minimum misfit (MacKay 2003, chapter 28): the
+/// standard deviation of places that it allows, metres, and its odds.
+fn laplace(
+    fit: &Fit<'_>,
+    family: Family,
+    (least, at): (f64, [f64; 3]),
+    misfit: &impl Fn(&Model) -> f64,
+    before: f64,
+) -> (f64, Explanation) {
+    let prior = (PRIOR / KINDS).ln();
+    let (mut numbers, mut log_odds, mut square_m2) = (at, prior + (before - least) / 2.0, 0.0);
+    for (axis, sigma) in family.sigmas().iter().enumerate() {
+        let moved = |by: f64| {
+            let mut next = at;
+            next[axis] += by;
+            Model::of(family.fault(&next))
+        };
+        let (low, high) = (misfit(&moved(-1.0)), misfit(&moved(1.0)));
+        let curvature = ((low + high) / 2.0 - least).max(0.0);
+        let weight = curvature + sigma.powi(-2);
+        let to_mode = ((low - high) / 4.0 - at[axis] * sigma.powi(-2)) / weight;
+        let step = to_mode.clamp(-1.0, 1.0);
+        numbers[axis] += step;
+        log_odds += (weight * step * (2.0 * to_mode - step) - (at[axis] / sigma).powi(2)) / 2.0;
+        log_odds -= (sigma * weight.sqrt()).ln();
+        let mut alone = [0.0; 3];
+        alone[axis] = 1.0;
+        let a_step_m = fit.displacement_m(&Model::of(family.fault(&alone)), true);
+        square_m2 += a_step_m.powi(2) * (numbers[axis].powi(2) + 1.0 / weight);
+    }
+    (square_m2.sqrt(), Explanation { model: Model::of(family.fault(&numbers)), log_odds })
 }
 
 /// Misfit of all looks together.
@@ -231,7 +338,7 @@ impl MapSurface {
 struct Model {
     fault: Fault,
     /// Poses of the sights, if they differ from the stated ones.
-    poses: Option<Vec<Isometry3<f64>>>,
+    poses: Option<Vec<Option<Isometry3<f64>>>>,
 }
 
 impl Default for Model {
@@ -243,6 +350,11 @@ impl Default for Model {
 impl Model {
     fn of(fault: Fault) -> Model {
         Model { fault, poses: None }
+    }
+
+    /// True if the model has a pose for a sight.
+    fn knows(&self, n: usize) -> bool {
+        self.poses.as_ref().is_none_or(|poses| poses[n].is_some())
     }
 
     /// True if aligning the outline of the surface corrects the fault: a displacement within the stated
@@ -271,7 +383,7 @@ impl Model {
 
     /// The true pose of a sight.
     fn pose(&self, sights: &[Sight], n: usize, centre: &Point3<f64>) -> Isometry3<f64> {
-        let stated = self.poses.as_ref().map_or(sights[n].world_from_camera, |poses| poses[n]);
+        let stated = self.poses.as_ref().and_then(|poses| poses[n]).unwrap_or(sights[n].world_from_camera);
         match self.fault {
             Fault::Displaced(shift, turn) => {
                 let about = Translation3::from(centre.coords);
@@ -283,6 +395,10 @@ impl Model {
         }
     }
 }
+
+/// Step of the logarithm of a factor, and of the principal point, pixels. From: work.
+const LOG_STEP: f64 = 0.02;
+const STEP_PX: f64 = 8.0;
 
 /// Family of faults with free parameters.
 #[derive(Clone, Copy, Debug)]
@@ -297,19 +413,28 @@ impl Family {
     const ALL: [Family; 4] =
         [Family::DepthScale, Family::FocalLength, Family::PrincipalPoint, Family::Displaced];
 
+    /// Standard deviations of the numbers, in steps, of a calibration error; none for poses.
+    fn sigmas(self) -> &'static [f64] {
+        match self {
+            Family::DepthScale | Family::FocalLength => &[CALIBRATION_SIGMA / LOG_STEP],
+            Family::PrincipalPoint => &[PRINCIPAL_SIGMA_PX / STEP_PX; 2],
+            Family::Displaced => &[],
+        }
+    }
+
     /// The fault of some numbers; `x` counts steps.
     fn fault(self, x: &[f64; 3]) -> Fault {
         match self {
-            Family::DepthScale => Fault::DepthScale((0.02 * x[0]).exp()),
-            Family::FocalLength => Fault::FocalLength((0.02 * x[0]).exp()),
-            Family::PrincipalPoint => Fault::PrincipalPoint(8.0 * Vector2::new(x[0], x[1])),
+            Family::DepthScale => Fault::DepthScale((LOG_STEP * x[0]).exp()),
+            Family::FocalLength => Fault::FocalLength((LOG_STEP * x[0]).exp()),
+            Family::PrincipalPoint => Fault::PrincipalPoint(STEP_PX * Vector2::new(x[0], x[1])),
             Family::Displaced => Fault::Displaced(0.05 * Vector2::new(x[0], x[1]), 0.05 * x[2]),
         }
     }
 
     /// Pattern search (Hooke and Jeeves 1961) for the minimum misfit, starting from the stated
     /// values; abandoned if no first step removes a good part of the misfit.
-    fn search(self, before: f64, misfit: &mut impl FnMut(Fault) -> f64) {
+    fn search(self, before: f64, misfit: &mut impl FnMut(Fault) -> f64) -> (f64, [f64; 3]) {
         /// Maximum number of evaluations. From: work.
         const EVALUATIONS: usize = 60;
         /// Maximum share of the misfit that a first step may leave for the search to go on. From: chosen.
@@ -332,11 +457,12 @@ impl Family {
                 }
             }
             if step < 1.0 && least > PROMISING * before {
-                return;
+                break;
             }
             if least == start {
                 step /= 2.0;
             }
         }
+        (least, at)
     }
 }

@@ -1,7 +1,7 @@
 //! Views of wrong cameras and bodies compared with the map, and of correct ones.
 
 use crate::scenes::on_a_table;
-use descry_perception::consistency::{Fault, Inconsistency, MapSurface, judge};
+use descry_perception::consistency::{Consistency, Fault, Inconsistency, MapSurface, judge};
 use descry_perception::{Intrinsics, View};
 use descry_robots::nalgebra::{
     Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
@@ -57,11 +57,18 @@ struct Claims {
     mirrored: bool,
     late: usize,
     off: [f64; 3],
+    /// Number of looks that are taken.
+    taken: usize,
 }
 
-const HONEST: Claims = Claims { depth: 1.0, camera: CAMERA, mirrored: false, late: 0, off: [0.0; 3] };
+const HONEST: Claims =
+    Claims { depth: 1.0, camera: CAMERA, mirrored: false, late: 0, off: [0.0; 3], taken: LOOKS };
 
 fn judged(claims: Claims) -> Option<Inconsistency> {
+    evidence(claims).inconsistency
+}
+
+fn evidence(claims: Claims) -> Consistency {
     let (scene, map) = table();
     let looks = looks(&scene, Point3::new(0.0, 0.0, map.height_m));
     let pixel = |n: usize| match claims.mirrored {
@@ -80,10 +87,14 @@ fn judged(claims: Claims) -> Option<Inconsistency> {
             ..View::alone(claims.camera.cloud_from_depth(&depths).unwrap())
         }
     };
-    let views: Vec<View> = (0..LOOKS).map(view).collect();
+    let views: Vec<View> = (0..claims.taken).map(view).collect();
     let stated: Vec<(&View, Isometry3<f64>)> = views.iter().map(|v| (v, v.world_from_camera)).collect();
-    let shifted = |by: usize| (0..LOOKS).map(|n| stated[(n + by) % LOOKS].1).collect();
-    judge(&stated, &[map], 0, &[(1, shifted(1)), (-1, shifted(LOOKS - 1))])
+    // Of the frame before the first and after the last nothing is known.
+    let shifted = |by: isize| {
+        let pose = |n: usize| stated.get(n.checked_add_signed(by)?).map(|(_, pose)| *pose);
+        (0..claims.taken).map(pose).collect()
+    };
+    judge(&stated, &[map], 0, &[(1, shifted(1)), (-1, shifted(-1))])
 }
 
 #[test]
@@ -124,4 +135,32 @@ fn a_wrong_focal_length_is_no_place() {
     let camera = Intrinsics { fx: 1.1 * CAMERA.fx, fy: 1.1 * CAMERA.fy, ..CAMERA };
     let found = judged(Claims { camera, ..HONEST });
     assert!(found.is_some_and(|found| found.spread_m > 0.03), "{found:?}");
+}
+
+#[test]
+fn two_looks_tell_a_depth_scale() {
+    for depth in [0.95, 1.05] {
+        let told = judged(Claims { depth, taken: 2, ..HONEST }).map(|found| found.fault);
+        assert!(matches!(told, Some(Fault::DepthScale(_))), "{depth}: {told:?}");
+    }
+}
+
+#[test]
+fn a_confused_unit_of_length_is_told() {
+    for depth in [10.0, 0.1, 1000.0, 1.0 / 0.0254] {
+        let told = judged(Claims { depth, ..HONEST }).map(|found| found.fault);
+        let near = |times: f64| (times / f64::from(depth) - 1.0).abs() < 1e-3;
+        assert!(matches!(told, Some(Fault::DepthScale(times)) if near(times)), "{depth}: {told:?}");
+    }
+}
+
+#[test]
+fn what_looks_allow_of_calibration_errors_widens_places() {
+    let honest = evidence(HONEST);
+    assert!(honest.doubt < 0.05 && (0.001..0.015).contains(&honest.spread_m), "{honest:?}");
+    let alone = evidence(Claims { taken: 1, ..HONEST });
+    assert!(alone.inconsistency.is_none() && alone.spread_m > honest.spread_m, "{alone:?}");
+    // Half a table's corner is 45 cm away, and its top 75 cm below: 3 % of it are 2.6 cm.
+    let off = evidence(Claims { depth: 1.03, taken: 1, ..HONEST });
+    assert!(off.spread_m > 0.026 / 3.0, "{off:?}");
 }

@@ -13,7 +13,7 @@ impl Situation {
         let thing = &self.things[what];
         let there = |t| match thing.probability(t, &self.surfaces) {
             0.0 => 0.0,
-            p => p * (1.0 - adrift::chance_off(self, t)),
+            p => p * (1.0 - adrift::chance_off(self, t)) * self.trust(t),
         };
         self.belief.tracks.iter().map(there).fold(0.0, f64::max)
     }
@@ -36,8 +36,13 @@ impl Situation {
         let thing = &self.things[what];
         self.on_surface(on)
             .filter(|t| thing.track.is_none_or(|id| id == t.id))
-            .map(|t| t.probability_of(&thing.name))
+            .map(|t| t.probability_of(&thing.name) * self.trust(t))
             .fold(0.0, f64::max)
+    }
+
+    /// Probability that camera and poses of the views by which an object is known have no fault.
+    fn trust(&self, track: &Track) -> f64 {
+        self.surface_of(track).map_or(1.0, |on| 1.0 - self.surfaces[on].sensor_doubt)
     }
 
     /// Probability that a thing was lost out of the hand and lies where no view of a surface shows it.
@@ -58,7 +63,7 @@ impl Situation {
     /// Confidence that each object on a surface is identified and none is hidden, 0 to 1.
     pub fn clarity(&self, on: usize) -> f64 {
         let sure = self.on_surface(on).map(Track::certainty).fold(1.0, f64::min);
-        sure * (1.0 - self.doubt_on(on).hidden)
+        sure * (1.0 - self.doubt_on(on).hidden) * (1.0 - self.surfaces[on].sensor_doubt)
     }
 
     /// Confidence that all members of a kind are known and no other is hidden, 0 to 1.

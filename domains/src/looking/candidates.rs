@@ -106,6 +106,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
         doubtful: None,
         placed: None,
         displaced_m: 0.0,
+        sensor_doubt: 0.0,
     });
     let named =
         domain.config.surfaces.iter().filter(|_| robot.surfaces().is_empty()).map(|name| KnownSurface {
@@ -119,6 +120,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
             doubtful: None,
             placed: None,
             displaced_m: 0.0,
+            sensor_doubt: 0.0,
         });
     on_map.chain(named).collect()
 }

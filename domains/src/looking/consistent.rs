@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use descry_perception::View;
-use descry_perception::consistency::{Fault, Inconsistency, MapSurface, judge};
+use descry_perception::consistency::{Consistency, Fault, Inconsistency, Late, MapSurface, judge};
 use descry_perception::merge::ViewFit;
 use descry_perception::nalgebra::Isometry3;
 
@@ -15,6 +15,7 @@ use crate::mind::{Mind, Region};
 use crate::note::Note;
 use crate::surface::KnownSurface;
 use crate::symbol::symbol;
+use descry_robots::{Place, Robot, Station};
 
 /// Distance below which two cameras count as one place, metres.
 const ONE_PLACE_M: f64 = 0.1;
@@ -32,18 +33,20 @@ pub(super) fn keep_expected(mind: &mut Mind, on: usize) {
 /// pose fault is likelier than the stated errors. `None` for an unmapped surface; a mere
 /// displacement makes places there uncertain instead.
 pub(super) fn with_map(mind: &mut Mind, eyes: Eyes<'_>, on: usize, views: &[View]) -> Option<Contradiction> {
-    let lie = judged(eyes, &mind.known.surfaces[on], &mind.regions[on], views);
-    let (contradiction, displaced_m) = match lie {
+    let judged = judged(eyes, &mind.known.surfaces[on], &mind.regions[on], views).unwrap_or_default();
+    let (contradiction, displaced_m) = match judged.inconsistency {
         Some(Inconsistency { fault: Fault::Displaced(..), spread_m, .. }) => (None, spread_m),
         Some(lie) => (Some(Contradiction::Fault(lie.fault)), 0.0),
         None => (None, 0.0),
     };
-    mind.known.surfaces[on].displaced_m = displaced_m;
+    let known = &mut mind.known.surfaces[on];
+    known.displaced_m = displaced_m.hypot(judged.spread_m);
+    known.sensor_doubt = if contradiction.is_some() { 0.0 } else { judged.doubt };
     contradiction
 }
 
-/// The likely fault of camera or poses, by the looks at a surface of the map.
-fn judged(eyes: Eyes<'_>, known: &KnownSurface, region: &Region, views: &[View]) -> Option<Inconsistency> {
+/// Evidence of a surface's views about camera and poses; `None` if the map has no such surface.
+fn judged(eyes: Eyes<'_>, known: &KnownSurface, region: &Region, views: &[View]) -> Option<Consistency> {
     let hints = eyes.robot.surfaces();
     let asked = hints.iter().position(|hint| known.whole && symbol(&hint.name) == known.symbol)?;
     let of_hint = |hint: &descry_robots::SurfaceHint| MapSurface {
@@ -60,11 +63,28 @@ fn judged(eyes: Eyes<'_>, known: &KnownSurface, region: &Region, views: &[View])
         looks.push((view, stated));
     }
     let stated: Vec<Isometry3<f64>> = looks.iter().map(|(_, pose)| *pose).collect();
-    let last = stated.len().saturating_sub(1);
-    let shifted = |by: isize| -> Vec<Isometry3<f64>> {
-        (0..=last).filter_map(|n| stated.get(n.saturating_add_signed(by).min(last)).copied()).collect()
+    Some(judge(&looks, &map, asked, &late(eyes.robot, &stated)))
+}
+
+/// Poses of the views where those are a frame late or early: of the next or last view in time, and of the next or last frame of
+/// a body that stands where frames were taken.
+fn late(robot: &dyn Robot, stated: &[Isometry3<f64>]) -> Vec<Late> {
+    let at = |station: &Station| robot.camera_at(&Place::Station(station.name.clone()), None).ok();
+    let frames: Vec<Isometry3<f64>> = robot.stations().unwrap_or_default().iter().filter_map(at).collect();
+    let near = |pose: &Isometry3<f64>| {
+        let away_m = |n: &usize| (frames[*n].translation.vector - pose.translation.vector).norm();
+        (0..frames.len()).min_by(|a, b| away_m(a).total_cmp(&away_m(b)))
     };
-    judge(&looks, &map, asked, &[(1, shifted(1)), (-1, shifted(-1))]).filter(Inconsistency::is_likely)
+    let by = |frame: usize, by: i64| frame.checked_add_signed(by as isize);
+    let in_time = |frames: i64| {
+        let pose = |n: usize| by(n, frames).and_then(|n| stated.get(n).copied());
+        (frames, (0..stated.len()).map(pose).collect())
+    };
+    let in_order = |lag: i64| {
+        let pose = |pose: &Isometry3<f64>| by(near(pose)?, lag).and_then(|n| frames.get(n).copied());
+        (lag, stated.iter().map(pose).collect())
+    };
+    [1, -1].into_iter().flat_map(|frames| [in_time(frames), in_order(frames)]).collect()
 }
 
 /// Contradiction among views, if inconsistent ones are as many as consistent ones.

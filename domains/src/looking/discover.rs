@@ -71,6 +71,7 @@ pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mu
             doubtful: None,
             placed: None,
             displaced_m: 0.0,
+            sensor_doubt: 0.0,
         };
         let at = known.centre().unwrap_or_else(Point3::origin);
         notes.push(Note::Surface { name, at_m: at.into(), area_m2: surface.area_m2 });

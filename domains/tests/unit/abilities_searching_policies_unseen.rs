@@ -21,6 +21,7 @@ fn the_grid_fills_the_space_above_the_outline() {
         doubtful: None,
         placed: None,
         displaced_m: 0.0,
+        sensor_doubt: 0.0,
     };
     let points = above(&surface);
     assert_eq!(points.len(), 9 * 5 * 6);

@@ -119,6 +119,7 @@ fn table() -> KnownSurface {
         doubtful: None,
         placed: None,
         displaced_m: 0.0,
+        sensor_doubt: 0.0,
     }
 }
 

@@ -53,6 +53,7 @@ fn check(cup: f64, newest_m: Option<f64>, other: Option<(f64, f64)>, kept: bool)
         doubtful: None,
         placed: None,
         displaced_m: 0.0,
+        sensor_doubt: 0.0,
     };
     let mut belief = Belief::default();
     belief.gone = vec![track(0, 0.0, 1.0, 0.07), track(1, 0.0, cup, 0.07)];

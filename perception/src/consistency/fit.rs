@@ -13,6 +13,9 @@ const HEIGHT_SIGMA_M: f64 = 0.01;
 /// From: chosen.
 const EDGES: f64 = 40.0;
 const HEIGHTS: f64 = 6.0;
+/// Number of independent measurements that all points of the edge in a look together count as. From: derived, offset
+/// and turn of each side of a table; along a side, errors of the map are common.
+const EDGE_POINTS: f64 = 8.0;
 /// Maximum distance from an edge that counts in the misfit, metres; larger distances are clamped.
 /// From: chosen.
 const GROSS_M: f64 = 0.10;
@@ -72,8 +75,9 @@ impl<'a> Fit<'a> {
         self.settle(n, model).0
     }
 
-    /// Distance that a point on the surface moves at most when the model's fault is mended, metres.
-    pub(super) fn displacement_m(&self, model: &Model) -> f64 {
+    /// Distance that a place on the surface moves at most when the model's fault is mended, metres; with
+    /// `is_laid`, after the surface was laid on its outline, which takes up shift and turn along it.
+    pub(super) fn displacement_m(&self, model: &Model, is_laid: bool) -> f64 {
         let ends = self.surface.outline_m.iter().map(|p| Point3::new(p.x, p.y, self.surface.height_m));
         let places: Vec<Point3<f64>> = ends.map(|p| self.centre + (p - self.centre) / 2.0).collect();
         let of_look = |n: usize| {
@@ -82,9 +86,26 @@ impl<'a> Fit<'a> {
                 let measured = sight.world_from_camera.inverse_transform_point(p);
                 moved * Point3::from(model.point(sight, &measured.coords)) - p
             };
-            places.iter().map(|p| mended(p).norm()).fold(0.0, f64::max)
+            let steps: Vec<Vector3<f64>> = places.iter().map(mended).collect();
+            let rigid = if is_laid {
+                self.planar_motion(&places, &steps)
+            } else {
+                vec![Vector3::zeros(); steps.len()]
+            };
+            steps.iter().zip(&rigid).map(|(step, rigid)| (step - rigid).norm()).fold(0.0, f64::max)
         };
         (0..self.sights.len()).map(of_look).fold(0.0, f64::max)
+    }
+
+    /// Shift and turn along the surface, by least squares, that displacements have in common: for each place.
+    fn planar_motion(&self, places: &[Point3<f64>], steps: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let across = |p: &Point3<f64>| Vector3::z().cross(&(p - self.centre));
+        let shift = steps.iter().sum::<Vector3<f64>>() / steps.len().max(1) as f64;
+        let (moment, inertia) = places.iter().zip(steps).fold((0.0, 0.0), |(moment, inertia), (p, step)| {
+            (moment + across(p).dot(step), inertia + across(p).norm_squared())
+        });
+        let turn_rad = if inertia > 0.0 { moment / inertia } else { 0.0 };
+        places.iter().map(|p| Vector3::new(shift.x, shift.y, 0.0) + across(p) * turn_rad).collect()
     }
 
     /// Misfit and likeliest pose of a look under a model.
@@ -92,16 +113,15 @@ impl<'a> Fit<'a> {
         let sight = &self.sights[n];
         let stated = model.pose(self.sights, n, &self.centre);
         let eye = stated.translation.vector;
-        let rays: Vec<(Vector3<f64>, bool)> = sight
-            .rays
-            .iter()
-            .map(|Ray { at, met }| ((stated * Point3::from(model.point(sight, at))).coords, *met))
-            .collect();
+        let placed = |at: &Vector3<f64>| (stated * Point3::from(model.point(sight, at))).coords;
+        let rays: Vec<(Vector3<f64>, bool)> =
+            sight.rays.iter().map(|Ray { at, met }| (placed(at), *met)).collect();
+        let edge: Vec<Vector3<f64>> = sight.edge.iter().map(placed).collect();
         let priors = Vector6::from_fn(|k, _| (if k < 3 { sight.sigma_m } else { sight.sigma_rad }).powi(-2));
         let mut error = Vector6::<f64>::zeros();
         let (mut least, mut likeliest) = (f64::INFINITY, error);
         for _ in 0..=STEPS {
-            let (misfit, normal, right) = self.linearise(&rays, &eye, &error);
+            let (misfit, normal, right) = self.linearise(&rays, &edge, &eye, &error);
             let (mut normal, mut right) = (normal, right);
             let of_pose: f64 = error.component_mul(&error).dot(&priors);
             if misfit + of_pose < least {
@@ -124,20 +144,27 @@ impl<'a> Fit<'a> {
     fn linearise(
         &self,
         rays: &[(Vector3<f64>, bool)],
+        edge: &[Vector3<f64>],
         eye: &Vector3<f64>,
         error: &Vector6<f64>,
     ) -> (f64, Matrix6<f64>, Vector6<f64>) {
         let (shift, turn) = (error.fixed_rows::<3>(0), error.fixed_rows::<3>(3));
         let mut edges = Sum::default();
+        let mut ends = Sum::default();
         let mut heights = Sum::default();
         let (mut judged, mut met) = (0.0, 0.0);
+        let moved = |at: &Vector3<f64>| at + shift + turn.cross(&(at - eye));
+        let row = |at: &Vector3<f64>, direction: &Vector3<f64>| {
+            let about = (at - eye).cross(direction);
+            Vector6::new(direction.x, direction.y, direction.z, about.x, about.y, about.z)
+        };
+        for at in edge {
+            let p = moved(at);
+            let Some((out_m, outward)) = self.sides.outside(&Point2::new(p.x, p.y)) else { continue };
+            ends.add(out_m, EDGE_SIGMA_M, &row(at, &Vector3::new(outward.x, outward.y, 0.0)));
+        }
         for (at, is_met) in rays {
-            let arm = at - eye;
-            let p = at + shift + turn.cross(&arm);
-            let row = |direction: &Vector3<f64>| {
-                let about = arm.cross(direction);
-                Vector6::new(direction.x, direction.y, direction.z, about.x, about.y, about.z)
-            };
+            let p = moved(at);
             let flat = Point2::new(p.x, p.y);
             let Some((out_m, outward)) = self.sides.outside(&flat) else { continue };
             if *is_met {
@@ -145,20 +172,23 @@ impl<'a> Fit<'a> {
                     continue;
                 }
                 met += 1.0;
-                heights.add(p.z - self.surface.height_m, HEIGHT_SIGMA_M, &row(&Vector3::z()));
+                heights.add(p.z - self.surface.height_m, HEIGHT_SIGMA_M, &row(at, &Vector3::z()));
             } else if out_m > OTHER_M {
                 continue;
             }
             judged += 1.0;
             if (out_m > 0.0) == *is_met {
-                edges.add(out_m, EDGE_SIGMA_M, &row(&Vector3::new(outward.x, outward.y, 0.0)));
+                edges.add(out_m, EDGE_SIGMA_M, &row(at, &Vector3::new(outward.x, outward.y, 0.0)));
             }
         }
         let (of_edge, of_height) = (EDGES / f64::max(judged, 1.0), HEIGHTS / f64::max(met, 1.0));
-        (
-            edges.misfit * of_edge + heights.misfit * of_height,
-            edges.normal * of_edge + heights.normal * of_height,
-            edges.right * of_edge + heights.right * of_height,
+        let of_end = (EDGE_POINTS / f64::max(edge.len() as f64, 1.0)).min(1.0);
+        let weighed = [(edges, of_edge), (heights, of_height), (ends, of_end)];
+        weighed.iter().fold(
+            (0.0, Matrix6::zeros(), Vector6::zeros()),
+            |(misfit, normal, right), (sum, by)| {
+                (misfit + sum.misfit * by, normal + sum.normal * *by, right + sum.right * *by)
+            },
         )
     }
 

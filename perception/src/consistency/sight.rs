@@ -19,6 +19,8 @@ const NEAR_M: [f64; 5] = [0.04, 0.03, 0.02, 0.015, 0.012];
 /// Depth below the plane from which a return was seen past the surface, metres. From: chosen, thicker than a
 /// board is rough.
 const PAST_M: f64 = 0.04;
+/// Maximum distance of the pixels between which an edge lies; beside edges, returns are missing. From: chosen.
+const GAP_PX: usize = 4;
 /// Minimum number of points for fitting a plane. From: chosen.
 const FEWEST: usize = 40;
 /// Minimum number of rays that say anything of the surface. From: chosen.
@@ -36,6 +38,8 @@ pub(super) struct Ray {
 #[derive(Clone, Debug)]
 pub(super) struct Sight {
     pub rays: Vec<Ray>,
+    /// Points of the surface's edge, where neighbouring rays hit and pass, in the optical frame.
+    pub edge: Vec<Vector3<f64>>,
     pub camera: Intrinsics,
     pub world_from_camera: Isometry3<f64>,
     pub sigma_m: f64,
@@ -43,19 +47,20 @@ pub(super) struct Sight {
 }
 
 impl Sight {
-    /// Rays of a view at the surface; `None` if the view has no pixels, or too few on the surface.
-    pub(super) fn of(view: &View, world_from_camera: &Isometry3<f64>, surface: &MapSurface) -> Option<Sight> {
-        let (camera, grid) = view.intrinsics.zip(view.cloud.grid)?;
-        let side = ((grid.width * grid.height) as f64 / ASKED as f64).sqrt().max(1.0) as usize;
-        let columns: Vec<usize> = (side / 2..grid.width).step_by(side).collect();
-        let point = |row: usize, column: usize| {
-            let point = view.cloud.points.get(row * grid.width + column)?;
-            is_finite(point).then(|| point.cast())
-        };
-        let asked: Vec<Option<Point3<f64>>> = (side / 2..grid.height)
-            .step_by(side)
-            .flat_map(|row| columns.iter().map(move |&column| (row, column)))
-            .map(|(row, column)| point(row, column))
+    /// Rays of a view at the surface with all depths divided by a factor; `None` if the view has no
+    /// pixels, or too few on the surface.
+    pub(super) fn of(
+        view: &View,
+        world_from_camera: &Isometry3<f64>,
+        surface: &MapSurface,
+        depth_times: f64,
+    ) -> Option<Sight> {
+        let image = Image::of(view, depth_times)?;
+        let (columns, rows) = image.asked();
+        let asked: Vec<Option<Point3<f64>>> = rows
+            .iter()
+            .flat_map(|&row| columns.iter().map(move |&column| (row, column)))
+            .map(|at| image.point(at))
             .collect();
         let points: Vec<Point3<f64>> = asked.iter().flatten().copied().collect();
         let plane = plane(&points, world_from_camera, surface);
@@ -74,14 +79,86 @@ impl Sight {
             let is_past = height_m < -PAST_M;
             ((met || is_past) && fall_m > 0.0).then(|| Ray { at: p.coords * (eye_m / fall_m), met })
         };
-        let rays: Vec<Ray> = asked.iter().enumerate().filter_map(ray).collect();
+        let each: Vec<Option<Ray>> = asked.iter().enumerate().map(ray).collect();
+        let met = |n: usize| each[n].map(|ray| ray.met);
+        let pixel = |n: usize| (rows[n / columns.len()], columns[n % columns.len()]);
+        let beside = |n: usize| {
+            let right = (n % columns.len() + 1 < columns.len()).then_some(n + 1);
+            let below = Some(n + columns.len()).filter(|&n| n < each.len());
+            right.into_iter().chain(below).map(move |other| (n, other))
+        };
+        let ends = (0..each.len()).flat_map(beside).filter_map(|(a, b)| match (met(a)?, met(b)?) {
+            (true, false) => Some((pixel(a), pixel(b))),
+            (false, true) => Some((pixel(b), pixel(a))),
+            _ => None,
+        });
+        let edge = ends.filter_map(|(from, to)| image.edge(from, to, &plane)).collect();
+        let rays: Vec<Ray> = each.into_iter().flatten().collect();
         (eye_m > 0.0 && rays.len() >= FEWEST_RAYS).then(|| Sight {
             rays,
-            camera,
+            edge,
+            camera: image.camera,
             world_from_camera: *world_from_camera,
             sigma_m: view.pose_sigma_m.max(1e-3),
             sigma_rad: view.pose_sigma_rad.max(1e-3),
         })
+    }
+}
+
+/// Points of a view by pixel, with all depths divided by a factor.
+struct Image<'a> {
+    camera: Intrinsics,
+    width: usize,
+    height: usize,
+    points: &'a [Point3<f32>],
+    depth_times: f64,
+}
+
+impl Image<'_> {
+    fn of(view: &View, depth_times: f64) -> Option<Image<'_>> {
+        let (camera, grid) = view.intrinsics.zip(view.cloud.grid)?;
+        Some(Image {
+            camera,
+            width: grid.width,
+            height: grid.height,
+            points: &view.cloud.points,
+            depth_times,
+        })
+    }
+
+    /// Columns and rows of the asked pixels.
+    fn asked(&self) -> (Vec<usize>, Vec<usize>) {
+        let side = ((self.width * self.height) as f64 / ASKED as f64).sqrt().max(1.0) as usize;
+        let each = |size: usize| (side / 2..size).step_by(side).collect();
+        (each(self.width), each(self.height))
+    }
+
+    fn point(&self, (row, column): (usize, usize)) -> Option<Point3<f64>> {
+        let point = self.points.get(row * self.width + column)?;
+        is_finite(point).then(|| point.cast::<f64>() / self.depth_times)
+    }
+
+    /// Point of the surface's edge between a pixel on the surface and one past it, in one row or column: on the side of
+    /// the board where that is seen, else in the plane; `None` where too many pixels between have no return.
+    fn edge(&self, from: (usize, usize), to: (usize, usize), plane: &Plane) -> Option<Vector3<f64>> {
+        let steps = from.0.abs_diff(to.0).max(from.1.abs_diff(to.1));
+        let along = |a: usize, b: usize, n: usize| {
+            if b >= a { a + (b - a) * n / steps } else { a - (a - b) * n / steps }
+        };
+        let points = (0..=steps).map(|n| self.point((along(from.0, to.0, n), along(from.1, to.1, n))));
+        let heights: Vec<(usize, Point3<f64>, f64)> =
+            points.enumerate().filter_map(|(n, p)| p.map(|p| (n, p, plane.height_m(&p)))).collect();
+        let last = heights.iter().rposition(|(_, _, height_m)| height_m.abs() < NEAR_M[NEAR_M.len() - 1])?;
+        let ((n, on, height_m), (next, past, past_m)) = (heights[last], *heights.get(last + 1)?);
+        if next - n > GAP_PX || past_m > 0.0 {
+            return None;
+        }
+        let in_plane =
+            |p: &Point3<f64>, height_m: f64| p.coords * (plane.offset_m / (plane.offset_m + height_m));
+        match past_m < -PAST_M {
+            true => Some((in_plane(&on, height_m) + in_plane(&past, past_m)) / 2.0),
+            false => Some(past.coords),
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{Breach, done, ensure};
 use crate::body::{Place, Pose2, Robot, Sensed, SurfaceHint, Watch};
 use descry_perception::View;
-use descry_perception::consistency::{Inconsistency, MapSurface, judge};
+use descry_perception::consistency::{MapSurface, judge};
 use nalgebra::{Isometry3, Point2, Point3, Vector2};
 use std::f64::consts::TAU;
 
@@ -106,7 +106,7 @@ fn check_looks(robot: &dyn Robot, surface: &SurfaceHint, looks: &[Sensed]) -> Re
         looks.iter().map(|look| (view(look), look.map_from_camera)).collect();
     let stated: Vec<(&View, Isometry3<f64>)> = views.iter().map(|(view, pose)| (view, *pose)).collect();
     let asked = robot.surfaces().iter().position(|s| s.name == surface.name).unwrap_or_default();
-    let inconsistency = judge(&stated, &map, asked, &[]).filter(Inconsistency::is_likely);
+    let inconsistency = judge(&stated, &map, asked, &[]).inconsistency;
     ensure(inconsistency.is_none(), PROMISE, || {
         let fault = inconsistency.map(|i| i.fault.to_string()).unwrap_or_default();
         format!("{} looks at the {} say that {fault}", looks.len(), surface.name)

@@ -397,6 +397,7 @@ impl OwnMap for Chart {
             doubtful: None,
             placed: None,
             displaced_m: 0.0,
+            sensor_doubt: 0.0,
         });
         known.collect()
     }

@@ -1,7 +1,6 @@
 //! Recordings of cameras and poses that are not as stated: answers of whole runs of `find`, by fault and its size, beside
 //! those about the true recordings of the same scenes.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use descry_agent::body::Body;
@@ -223,8 +222,10 @@ impl Answer {
 /// True if the named fault is of the kind of the lie.
 fn is_named(lie: Lie, contradiction: Contradiction) -> bool {
     match (lie, contradiction) {
-        (Lie::Scale(_) | Lie::Unit(_), Contradiction::Fault(Fault::DepthScale(_)))
-        | (Lie::Mirrored, Contradiction::Fault(Fault::Mirrored))
+        (Lie::Scale(true_times) | Lie::Unit(true_times), Contradiction::Fault(Fault::DepthScale(times))) => {
+            (0.5..2.0).contains(&(times.ln() / true_times.ln()))
+        }
+        (Lie::Mirrored, Contradiction::Fault(Fault::Mirrored))
         | (Lie::Focal(_), Contradiction::Fault(Fault::FocalLength(_)))
         | (Lie::Principal(_), Contradiction::Fault(Fault::PrincipalPoint(_)))
         | (Lie::Biased(..), Contradiction::Fault(Fault::Displaced(..))) => true,
@@ -235,22 +236,24 @@ fn is_named(lie: Lie, contradiction: Contradiction) -> bool {
 
 /// Counts of a row.
 #[derive(Default)]
-struct Tally {
+pub struct Tally {
     count: usize,
-    answers: [usize; 5],
+    /// Runs by their answer: right, off, false yes, false *not there*, cannot tell.
+    pub answers: [usize; 5],
     /// Runs that end with a named fault or contradiction, and those among them with the right one.
     told: usize,
     named: usize,
     looks: usize,
 }
 
-/// Prints a row for each kind of lie, and one for the true recordings of the same scenes: `count` lies in all, scenes with the
+/// Counts for each kind of lie, and last for the true recordings of the same scenes: `count` lies in all, scenes with the
 /// requested object and without it in turn, from a seed.
-pub fn run(count: usize, first: u64) -> Result<(), String> {
+pub fn measured(count: usize, first: u64) -> Result<Vec<(&'static str, Tally)>, String> {
     let domain = Domain::load("tabletop").map_err(|e| e.to_string())?;
     let spec = room::spec("A cup among others", OBJECTS)?;
     let runtime = room::runtime()?;
-    let mut tallies: BTreeMap<usize, Tally> = BTreeMap::new();
+    let names = ROWS.iter().map(|(name, _)| *name).chain(["none"]);
+    let mut tallies: Vec<(&'static str, Tally)> = names.map(|name| (name, Tally::default())).collect();
     for begin in (0..count).step_by(ROWS.len()) {
         let of_scene = (begin / ROWS.len()) as u64;
         let (seed, present) = (first + of_scene, of_scene.is_multiple_of(2));
@@ -263,7 +266,7 @@ pub fn run(count: usize, first: u64) -> Result<(), String> {
             let (report, told) = runtime.block_on(searched(&domain, recording.told_with(*lie), seed))?;
             let answer = Answer::of(&report, recording.centre_m);
             let is_honest = matches!(lie, Lie::None);
-            let tally = tallies.entry(if is_honest { ROWS.len() } else { row }).or_default();
+            let (_, tally) = &mut tallies[if is_honest { ROWS.len() } else { row }];
             tally.count += 1;
             tally.answers[answer as usize] += 1;
             tally.told += usize::from(told.is_some());
@@ -279,8 +282,7 @@ pub fn run(count: usize, first: u64) -> Result<(), String> {
             }
         }
     }
-    print(&tallies);
-    Ok(())
+    Ok(tallies)
 }
 
 /// Scene of a seed with the requested cup, or without it: then nothing stands there, or another cup.
@@ -341,7 +343,9 @@ async fn searched(
     Ok((report.map_err(|e| text(&e))?, told))
 }
 
-fn print(tallies: &BTreeMap<usize, Tally>) {
+/// Prints the counts of [`measured`] as a table.
+pub fn run(count: usize, first: u64) -> Result<(), String> {
+    let tallies = measured(count, first)?;
     println!(
         "{:>22} {:>5} {:>6} {:>12} {:>9} {:>15} {:>11} {:>10} {:>13} {:>6}",
         "",
@@ -355,8 +359,7 @@ fn print(tallies: &BTreeMap<usize, Tally>) {
         "named rightly",
         "looks"
     );
-    for (row, tally) in tallies {
-        let name = ROWS.get(*row).map_or("none", |(name, _)| name);
+    for (name, tally) in tallies.iter().filter(|(_, tally)| tally.count > 0) {
         let [right, off, yes, denied, open] = tally.answers;
         let looks = tally.looks as f64 / tally.count.max(1) as f64;
         println!(
@@ -364,4 +367,5 @@ fn print(tallies: &BTreeMap<usize, Tally>) {
             tally.count, tally.told, tally.named
         );
     }
+    Ok(())
 }

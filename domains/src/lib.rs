@@ -9,6 +9,7 @@ pub mod belief;
 pub mod check;
 pub mod conclusion;
 pub mod config;
+pub mod contradiction;
 #[doc(hidden)]
 pub mod culprit;
 pub mod declared;

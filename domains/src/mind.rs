@@ -8,9 +8,9 @@ use descry_perception::View;
 use descry_perception::merge::{MergeOptions, Merged, Merger};
 use descry_perception::nalgebra::Isometry3;
 
+use crate::contradiction::Contradiction;
 use crate::known::Known;
 use crate::looking::change::Change;
-use crate::looking::contradiction::Contradiction;
 use crate::words::Words;
 
 /// Everything that a world has come to know.

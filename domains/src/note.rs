@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::contradiction::Contradiction;
 use crate::english::{self, percent};
-use crate::looking::contradiction::Contradiction;
 
 /// News from an update of the world model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

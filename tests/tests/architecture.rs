@@ -397,7 +397,7 @@ fn public_type_names_are_unique_in_a_crate() {
 const LAYERS: [(&str, &str); 4] = [
     (
         "language",
-        "config declared english function lexicon load mentions no_plan note objective past program programs slots \
+        "config contradiction declared english function lexicon load mentions no_plan note objective past program programs slots \
          symbol template toml_place vocabulary words",
     ),
     (

@@ -8,9 +8,9 @@ use descry_perception::consistency::{Consistency, Fault, Inconsistency, Late, Ma
 use descry_perception::merge::ViewFit;
 use descry_perception::nalgebra::Isometry3;
 
+use crate::contradiction::Contradiction;
 use crate::error::WorldError;
 use crate::eyes::{Eyes, put};
-use crate::looking::contradiction::Contradiction;
 use crate::mind::{Mind, Region};
 use crate::note::Note;
 use crate::surface::KnownSurface;

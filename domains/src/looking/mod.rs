@@ -3,7 +3,6 @@
 pub mod candidates;
 pub mod change;
 mod consistent;
-pub mod contradiction;
 mod discover;
 pub mod looks;
 pub(crate) mod merging;

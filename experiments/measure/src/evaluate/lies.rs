@@ -4,14 +4,14 @@
 use std::sync::Arc;
 
 use descry_agent::body::Body;
-use descry_agent::keeping::Keeping;
+use descry_agent::keeping::{Keeping, Kept};
 use descry_agent::report::{Event, Report};
 use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
 use descry_domains::conclusion::Verdict;
+use descry_domains::contradiction::Contradiction;
 use descry_domains::load::Domain;
-use descry_domains::looking::contradiction::Contradiction;
 use descry_domains::note::Note;
 use descry_perception::Intrinsics;
 use descry_perception::consistency::Fault;
@@ -26,6 +26,8 @@ use super::tabletop::Draws;
 
 /// Frames of a recording around the table.
 const FRAMES: usize = 8;
+/// Distances farther out at which a frame is taken where the body cannot stand, metres.
+const OUTWARDS_M: [f64; 4] = [0.1, 0.2, 0.3, 0.4];
 
 const OBJECTS: &str = r#"
 [[object]]
@@ -139,9 +141,17 @@ impl Truthful {
         for n in 0..FRAMES + 2 {
             let angle = begin + std::f64::consts::TAU * (n as f64 + 0.3 * draws.next()) / FRAMES as f64;
             let distance_m = between(&mut draws, 1.2, 1.6);
-            let at = middle + distance_m * Vector2::new(angle.cos(), angle.sin());
-            let place = Place::Pose(Pose2::facing(at.x, at.y, &middle));
-            robot.drive_to(&place, &watch).await.map_err(|e| format!("{e:?}"))?;
+            let pose = |outwards_m: f64| {
+                let at = middle + (distance_m + outwards_m) * Vector2::new(angle.cos(), angle.sin());
+                Place::Pose(Pose2::facing(at.x, at.y, &middle))
+            };
+            let mut driven = robot.drive_to(&pose(0.0), &watch).await;
+            for outwards_m in OUTWARDS_M {
+                if driven.is_err() {
+                    driven = robot.drive_to(&pose(outwards_m), &watch).await;
+                }
+            }
+            driven.map_err(|e| format!("{e:?}"))?;
             let target = Point3::new(middle.x, middle.y, height_m);
             robot.look_at(&target, &watch).await.map_err(|e| format!("{e:?}"))?;
             let sensed = robot.sense(&watch).await.map_err(|e| format!("{e:?}"))?;
@@ -236,7 +246,7 @@ fn is_named(lie: Lie, contradiction: Contradiction) -> bool {
 
 /// Counts of a row.
 #[derive(Default)]
-pub struct Tally {
+pub struct AnswerCounts {
     count: usize,
     /// Runs by their answer: right, off, false yes, false *not there*, cannot tell.
     pub answers: [usize; 5],
@@ -248,12 +258,13 @@ pub struct Tally {
 
 /// Counts for each kind of lie, and last for the true recordings of the same scenes: `count` lies in all, scenes with the
 /// requested object and without it in turn, from a seed.
-pub fn measured(count: usize, first: u64) -> Result<Vec<(&'static str, Tally)>, String> {
+pub fn measured(count: usize, first: u64) -> Result<Vec<(&'static str, AnswerCounts)>, String> {
     let domain = Domain::load("tabletop").map_err(|e| e.to_string())?;
     let spec = room::spec("A cup among others", OBJECTS)?;
     let runtime = room::runtime()?;
     let names = ROWS.iter().map(|(name, _)| *name).chain(["none"]);
-    let mut tallies: Vec<(&'static str, Tally)> = names.map(|name| (name, Tally::default())).collect();
+    let mut tallies: Vec<(&'static str, AnswerCounts)> =
+        names.map(|name| (name, AnswerCounts::default())).collect();
     for begin in (0..count).step_by(ROWS.len()) {
         let of_scene = (begin / ROWS.len()) as u64;
         let (seed, present) = (first + of_scene, of_scene.is_multiple_of(2));
@@ -326,7 +337,7 @@ async fn searched(
         seed,
         domain: domain.config.name.clone(),
         policy: policies::PLAN.into(),
-        keeping: Keeping::default(),
+        keeping: Keeping { durability: Some(Kept::Process), ..Keeping::default() },
         remember: None,
     };
     let folder = Folder::made(&scratch.path().join("run")).map_err(|e| text(&e))?;

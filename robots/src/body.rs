@@ -9,6 +9,7 @@ mod place;
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::parts::{Description, Part};
+use crate::request::{Answer, Request};
 use descry_perception::laser::Scan;
 use descry_perception::{Cloud, Intrinsics, View};
 use image::RgbImage;
@@ -206,6 +207,14 @@ pub struct Push {
     pub direction: Vector2<f64>,
     /// Length of the push, metres.
     pub distance_m: f64,
+}
+
+impl Push {
+    /// True if the direction and the length are those of a push.
+    pub(crate) fn is_definite(&self) -> bool {
+        let length = self.direction.norm();
+        length > 0.0 && length.is_finite() && self.distance_m.is_finite() && self.distance_m > 0.0
+    }
 }
 
 /// Result of a completed push.
@@ -407,46 +416,60 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks_sense(sense))
     }
 
+    /// Carries out a request of the arm, such as [`Request::Grasp`].
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] if the body cannot do that, the hand is full or empty, or the object is too wide;
+    /// [`Failure::Unreachable`] if the target is out of reach; [`Failure::Blocked`] if something stands there;
+    /// [`Failure::Slipped`] if the hand closes on nothing or loses what it holds; [`Failure::TimedOut`],
+    /// [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn manipulate(&self, request: &Request, watch: &Watch<'_>) -> Result<Answer, Failure> {
+        let _ = watch;
+        Err(request.beyond(self.description()))
+    }
+
     /// Pushes an object aside.
     ///
     /// # Errors
-    /// [`Failure::Unable`] without [`Description::arm`]; [`Failure::Unreachable`] if the object is out of the
-    /// arm's reach; [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    /// Those of [`Robot::manipulate`].
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
-        let _ = (push, watch);
-        Err(self.description().lacks(Part::Arm))
+        match self.manipulate(&Request::PushAside(*push), watch).await? {
+            Answer::Pushed(pushed) => Ok(pushed),
+            other => Err(other.strange()),
+        }
     }
 
-    /// Opens a nearby door from the current pose of the base.
+    /// Opens a nearby door, by name.
     ///
     /// # Errors
-    /// [`Failure::Unable`] if the body cannot open doors; [`Failure::Unreachable`] if no door of that name is
-    /// in reach; [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    /// Those of [`Robot::manipulate`].
     async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
-        let _ = (door, watch);
-        Err(Failure::Unable { because: format!("{} does not open doors", self.description().name) })
+        match self.manipulate(&Request::OpenDoor(door.into()), watch).await? {
+            Answer::Opened(opened) => Ok(opened),
+            other => Err(other.strange()),
+        }
     }
 
     /// Grasps an object and lifts it.
     ///
     /// # Errors
-    /// [`Failure::Unable`] without [`Arm::hand`](crate::Arm::hand), if the hand is full, or if the object is
-    /// too wide; [`Failure::Unreachable`] if the object is out of reach; [`Failure::Slipped`] if the hand
-    /// closes on nothing or loses the object; [`Failure::TimedOut`], [`Failure::Cancelled`],
-    /// [`Failure::Broken`].
+    /// Those of [`Robot::manipulate`].
     async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
-        let _ = (grasp, watch);
-        Err(self.description().lacks(Part::Hand))
+        match self.manipulate(&Request::Grasp(*grasp), watch).await? {
+            Answer::Grasped(grasped) => Ok(grasped),
+            other => Err(other.strange()),
+        }
     }
 
     /// Puts down the held object.
     ///
     /// # Errors
-    /// [`Failure::Unable`] if the hand is empty; [`Failure::Unreachable`] if the place is out of reach; [`Failure::Blocked`] if
-    /// something stands there; [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    /// Those of [`Robot::manipulate`].
     async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
-        let _ = (placing, watch);
-        Err(self.description().lacks(Part::Hand))
+        match self.manipulate(&Request::Place(*placing), watch).await? {
+            Answer::Placed(placed) => Ok(placed),
+            other => Err(other.strange()),
+        }
     }
 
     /// Current state of the hand.

@@ -5,7 +5,7 @@ use crate::body::{
     Reading, Robot, Scanned, Sensed, Stamp, StampedTransform, Watch,
 };
 use crate::failure::Failure;
-use crate::parts::Part;
+use crate::parts::{Description, Part};
 use descry_perception::{Cloud, Intrinsics};
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
@@ -68,6 +68,23 @@ impl Request {
         }
     }
 
+    /// Point in the map that the arm is to reach, if the request has one.
+    pub fn target(&self) -> Option<&Point3<f64>> {
+        match self {
+            Request::PushAside(push) => Some(&push.object),
+            Request::Grasp(grasp) => Some(&grasp.object),
+            Request::Place(placing) => Some(&placing.foot),
+            _ => None,
+        }
+    }
+
+    /// Failure of the request for a body that cannot carry it out.
+    pub fn beyond(&self, body: &Description) -> Failure {
+        let because = || format!("{} cannot {self}", body.name);
+        let lacks = self.needs().filter(|part| !body.has(*part)).map(|part| body.lacks(part));
+        lacks.unwrap_or_else(|| Failure::Unable { because: because() })
+    }
+
     /// Sends the request to a body; returns the answer, and for a camera frame also the frame with its
     /// pixels.
     pub async fn ask(&self, body: &dyn Robot, watch: &Watch<'_>) -> (Answer, Option<Sensed>) {
@@ -77,10 +94,9 @@ impl Request {
             Request::LookAt(point) => body.look_at(point, watch).await.map(Answer::Looked),
             Request::Scan => body.scan(watch).await.map(Answer::Scanned),
             Request::Read(sense) => body.read(sense, watch).await.map(Answer::Read),
-            Request::PushAside(push) => body.push_aside(push, watch).await.map(Answer::Pushed),
-            Request::OpenDoor(door) => body.open_door(door, watch).await.map(Answer::Opened),
-            Request::Grasp(grasp) => body.grasp(grasp, watch).await.map(Answer::Grasped),
-            Request::Place(placing) => body.place(placing, watch).await.map(Answer::Placed),
+            Request::PushAside(_) | Request::OpenDoor(_) | Request::Grasp(_) | Request::Place(_) => {
+                body.manipulate(self, watch).await
+            }
             Request::Hand => body.hand().await.map(Answer::Hand),
             Request::Sense => match body.sense(watch).await {
                 Ok(sensed) => return (Answer::Sensed(Exposure::of(&sensed)), Some(sensed)),
@@ -157,6 +173,14 @@ pub struct Exposure {
 }
 
 impl Answer {
+    /// Failure for an answer of an unexpected kind: the one that it holds, else [`Failure::Broken`].
+    pub(crate) fn strange(self) -> Failure {
+        match self {
+            Answer::Failed(failure) => failure,
+            other => Failure::Broken { because: format!("the answer to another request: {other:?}") },
+        }
+    }
+
     /// Shifts the time stamps of the answer by `by_ns` nanoseconds.
     pub(crate) fn later(mut self, by_ns: Stamp) -> Self {
         match &mut self {

@@ -5,8 +5,8 @@ use descry_robots::conformance;
 use descry_robots::recorded::RecordedRobot;
 use descry_robots::sim::{SimOptions, SimRobot};
 use descry_robots::{
-    Description, Driven, Failure, Grasp, Grasped, Hand, Looked, OccupancyGrid, Place, Placed, Placing,
-    PoseEstimate, Robot, Scanned, Sensed, Stamp, Station, SurfaceHint, Travel, Watch, async_trait, nalgebra,
+    Answer, Description, Driven, Failure, Grasped, Hand, Looked, OccupancyGrid, Place, PoseEstimate, Request,
+    Robot, Scanned, Sensed, Stamp, Station, SurfaceHint, Travel, Watch, async_trait, nalgebra,
 };
 
 fn simulated(seed: u64) -> SimRobot {
@@ -138,16 +138,13 @@ impl Robot for Liar {
             _ => Ok(scanned),
         }
     }
-    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
-        match self.honest.grasp(grasp, watch).await {
-            Err(Failure::Slipped { .. }) if self.lie == Lie::Greedy => {
-                Ok(Grasped { width_m: grasp.width_m, duration_s: 1.0 })
+    async fn manipulate(&self, request: &Request, watch: &Watch<'_>) -> Result<Answer, Failure> {
+        match (request, self.honest.manipulate(request, watch).await) {
+            (Request::Grasp(grasp), Err(Failure::Slipped { .. })) if self.lie == Lie::Greedy => {
+                Ok(Answer::Grasped(Grasped { width_m: grasp.width_m, duration_s: 1.0 }))
             }
-            answer => answer,
+            (_, answer) => answer,
         }
-    }
-    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
-        self.honest.place(placing, watch).await
     }
     async fn hand(&self) -> Result<Hand, Failure> {
         if self.lie == Lie::Numb { Ok(Hand { holds: true }) } else { self.honest.hand().await }

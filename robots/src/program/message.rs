@@ -1,11 +1,12 @@
 //! Messages of the protocol, with their checks.
 
-use crate::body::{Grasp, Place, Placing, Push, Stamp};
+use crate::body::{Grasp, Grasped, Opened, Place, Placed, Placing, Push, Pushed, Stamp};
 use crate::failure::Failure;
-use crate::request::Request;
+use crate::request::{Answer, Request};
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// Maximum time stamp of a program, nanoseconds, which leaves headroom for arithmetic.
 const LATEST_NS: Stamp = 4_000_000_000_000_000_000;
@@ -196,6 +197,33 @@ pub(super) struct GraspedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NothingSaid {}
+
+/// Parses the answer to a request of the arm, which took `duration_s` seconds.
+///
+/// # Errors
+/// If a part is missing or malformed, or a length is negative.
+pub(super) fn manipulated(request: &Request, said: Value, duration_s: f64) -> Result<Answer, String> {
+    let name = request.name();
+    Ok(match request {
+        Request::PushAside(_) => {
+            let PushedSaid { moved_m } = answer(name, said)?;
+            Answer::Pushed(Pushed { moved_m: amount("moved_m", moved_m)?, duration_s })
+        }
+        Request::OpenDoor(_) => {
+            let NothingSaid {} = answer(name, said)?;
+            Answer::Opened(Opened { duration_s })
+        }
+        Request::Grasp(_) => {
+            let GraspedSaid { width_m } = answer(name, said)?;
+            Answer::Grasped(Grasped { width_m: amount("width_m", width_m)?, duration_s })
+        }
+        Request::Place(_) => {
+            let NothingSaid {} = answer(name, said)?;
+            Answer::Placed(Placed { duration_s })
+        }
+        other => return Err(format!("{other} is nothing for an arm")),
+    })
+}
 
 /// Parses the answer to a request.
 ///

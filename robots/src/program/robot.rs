@@ -1,9 +1,8 @@
 //! Implementation of the [`Robot`] trait for a program.
 
 use crate::body::{
-    Colour, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, Pose2, PoseEstimate,
-    Progress, Push, Pushed, Reading, Robot, Room, Scanned, Sensed, Stamp, StampedTransform, Station,
-    SurfaceHint, Travel, Watch,
+    Colour, Door, Driven, Hand, Looked, Place, Pose2, PoseEstimate, Progress, Reading, Robot, Room, Scanned,
+    Sensed, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
@@ -17,7 +16,7 @@ use crate::program::process::Process;
 use crate::program::socket::Socket;
 use crate::program::talk::{Done, Talk};
 use crate::recorded::Known;
-use crate::request::{Exposure, Pixels, Request};
+use crate::request::{Answer, Exposure, Pixels, Request};
 use descry_perception::laser::Scan;
 use image::RgbImage;
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2};
@@ -406,51 +405,15 @@ impl Robot for ProgramRobot {
         self.hold(read).await
     }
 
-    async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
-        let Some(reach_m) = self.known.description.reach_m() else { return Err(self.lacks(Part::Arm)) };
-        let numbers = [push.object.x, push.object.y, push.object.z, push.direction.x, push.direction.y];
-        let way = push.direction.norm() > 0.0 && push.distance_m.is_finite() && push.distance_m > 0.0;
-        if !(numbers.iter().all(|x| x.is_finite()) && way) {
-            let because = format!("a push needs a place, a direction and a distance within {reach_m} m");
-            return Err(Failure::Unreachable { because });
+    async fn manipulate(&self, request: &Request, watch: &Watch<'_>) -> Result<Answer, Failure> {
+        self.can_begin(request)?;
+        let done = self.ask(request, watch).await?;
+        let duration_s = done.duration_s();
+        let answer = self.hold(message::manipulated(request, done.said, duration_s)).await?;
+        if let Request::OpenDoor(door) = request {
+            self.places.met_door(door, false);
         }
-        let done = self.ask(&Request::PushAside(*push), watch).await?;
-        let duration_s = done.duration_s();
-        let said = answer("push_aside", done.said).and_then(|said: message::PushedSaid| {
-            Ok(Pushed { moved_m: amount("moved_m", said.moved_m)?, duration_s })
-        });
-        self.hold(said).await
-    }
-
-    async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
-        if !self.known.doors.iter().any(|d| d.name == door) {
-            let because = format!("{} knows no door \"{door}\"", self.known.description.name);
-            return Err(Failure::Unreachable { because });
-        }
-        let done = self.ask(&Request::OpenDoor(door.into()), watch).await?;
-        let duration_s = done.duration_s();
-        let said = answer("open_door", done.said).map(|_: message::NothingSaid| Opened { duration_s });
-        let opened = self.hold(said).await?;
-        self.places.met_door(door, false);
-        Ok(opened)
-    }
-
-    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
-        self.hand_for(&grasp.object)?;
-        let done = self.ask(&Request::Grasp(*grasp), watch).await?;
-        let duration_s = done.duration_s();
-        let said = answer("grasp", done.said).and_then(|said: message::GraspedSaid| {
-            Ok(Grasped { width_m: amount("width_m", said.width_m)?, duration_s })
-        });
-        self.hold(said).await
-    }
-
-    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
-        self.hand_for(&placing.foot)?;
-        let done = self.ask(&Request::Place(*placing), watch).await?;
-        let duration_s = done.duration_s();
-        let said = answer("place", done.said).map(|_: message::NothingSaid| Placed { duration_s });
-        self.hold(said).await
+        Ok(answer)
     }
 
     async fn hand(&self) -> Result<Hand, Failure> {
@@ -464,12 +427,25 @@ impl ProgramRobot {
         self.known.description.lacks(part)
     }
 
-    /// Checks that the body has a hand, and that the coordinates of a point are finite.
-    fn hand_for(&self, point: &Point3<f64>) -> Result<(), Failure> {
-        self.known.description.need(Part::Hand)?;
-        match point.iter().all(|x| x.is_finite()) {
-            true => Ok(()),
-            false => Err(Failure::Unreachable { because: format!("{point} is no place for a hand") }),
-        }
+    /// Checks that the body has the arm or hand that a request needs, that the target is a point or a known
+    /// door, and that a push has a direction and a length.
+    fn can_begin(&self, request: &Request) -> Result<(), Failure> {
+        let body = &self.known.description;
+        request.needs().map_or(Ok(()), |part| body.need(part))?;
+        let because = match request {
+            Request::OpenDoor(door) if self.known.doors.iter().all(|d| d.name != *door) => {
+                format!("{} knows no door \"{door}\"", body.name)
+            }
+            Request::PushAside(push) if !push.is_definite() => {
+                "a push needs a direction and a distance".into()
+            }
+            _ => match request.target() {
+                Some(point) if !point.iter().all(|x| x.is_finite()) => {
+                    format!("{point} is no place for a hand")
+                }
+                _ => return Ok(()),
+            },
+        };
+        Err(Failure::Unreachable { because })
     }
 }

@@ -3,8 +3,8 @@
 
 use super::tape::{Entry, Known, Question, Reply, Tape};
 use crate::body::{
-    Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate, Push, Pushed,
-    Reading, Robot, Room, Scanned, Sensed, Stamp, Station, SurfaceHint, Travel, Watch,
+    Door, Driven, Hand, Looked, Place, PoseEstimate, Reading, Robot, Room, Scanned, Sensed, Stamp, Station,
+    SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
@@ -331,15 +331,6 @@ enum Met {
     Elsewhere(Failure),
 }
 
-/// Failure for an answer of an unexpected kind: the one that it holds, else [`Failure::Broken`], since only a
-/// damaged record holds an answer of the wrong kind.
-fn mixed_up<T>(answer: Answer) -> Result<T, Failure> {
-    match answer {
-        Answer::Failed(failure) => Err(failure),
-        other => Err(Failure::Broken { because: format!("the record answers with {other:?}") }),
-    }
-}
-
 #[async_trait::async_trait]
 impl Robot for TapedRobot {
     fn description(&self) -> &Description {
@@ -389,21 +380,21 @@ impl Robot for TapedRobot {
     async fn pose(&self) -> Result<PoseEstimate, Failure> {
         match self.ask(Request::Pose, &Watch::default()).await? {
             (Answer::Pose(pose), _) => Ok(pose),
-            (other, _) => mixed_up(other),
+            (other, _) => Err(other.strange()),
         }
     }
 
     async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure> {
         match self.ask(Request::DriveTo(to.clone()), watch).await? {
             (Answer::Driven(driven), _) => Ok(driven),
-            (other, _) => mixed_up(other),
+            (other, _) => Err(other.strange()),
         }
     }
 
     async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
         match self.ask(Request::LookAt(*point), watch).await? {
             (Answer::Looked(looked), _) => Ok(looked),
-            (other, _) => mixed_up(other),
+            (other, _) => Err(other.strange()),
         }
     }
 
@@ -414,56 +405,35 @@ impl Robot for TapedRobot {
                 let pixels = self.tape.pixels(exposure.stamp_ns);
                 Ok(exposure.with(pixels.map_err(|because| Failure::Broken { because })?))
             }
-            (other, _) => mixed_up(other),
+            (other, _) => Err(other.strange()),
         }
     }
 
     async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
         match self.ask(Request::Scan, watch).await? {
             (Answer::Scanned(scanned), _) => Ok(scanned),
-            (other, _) => mixed_up(other),
+            (other, _) => Err(other.strange()),
         }
     }
 
     async fn read(&self, sense: &str, watch: &Watch<'_>) -> Result<Reading, Failure> {
         match self.ask(Request::Read(sense.into()), watch).await? {
             (Answer::Read(reading), _) => Ok(reading),
-            (other, _) => mixed_up(other),
+            (other, _) => Err(other.strange()),
         }
     }
 
-    async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
-        match self.ask(Request::PushAside(*push), watch).await? {
-            (Answer::Pushed(pushed), _) => Ok(pushed),
-            (other, _) => mixed_up(other),
-        }
-    }
-
-    async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
-        match self.ask(Request::OpenDoor(door.into()), watch).await? {
-            (Answer::Opened(opened), _) => Ok(opened),
-            (other, _) => mixed_up(other),
-        }
-    }
-
-    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
-        match self.ask(Request::Grasp(*grasp), watch).await? {
-            (Answer::Grasped(grasped), _) => Ok(grasped),
-            (other, _) => mixed_up(other),
-        }
-    }
-
-    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
-        match self.ask(Request::Place(*placing), watch).await? {
-            (Answer::Placed(placed), _) => Ok(placed),
-            (other, _) => mixed_up(other),
+    async fn manipulate(&self, request: &Request, watch: &Watch<'_>) -> Result<Answer, Failure> {
+        match self.ask(request.clone(), watch).await?.0 {
+            Answer::Failed(failure) => Err(failure),
+            answer => Ok(answer),
         }
     }
 
     async fn hand(&self) -> Result<Hand, Failure> {
         match self.ask(Request::Hand, &Watch::default()).await? {
             (Answer::Hand(hand), _) => Ok(hand),
-            (other, _) => mixed_up(other),
+            (other, _) => Err(other.strange()),
         }
     }
 }

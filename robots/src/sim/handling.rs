@@ -1,7 +1,8 @@
 //! Arm of the simulated body: pushing, grasping, placing, opening doors.
 
-use crate::body::{Grasp, Grasped, Opened, Placed, Placing, Pose2, Progress, Push, Pushed, Watch};
+use crate::body::{Grasp, Grasped, Opened, Placed, Placing, Pose2, Progress, Push, Pushed, Robot, Watch};
 use crate::failure::Failure;
+use crate::request::{Answer, Request};
 use crate::sim::body::{HAND_OPENING_M, REACH_M};
 use crate::sim::faults::FaultKind;
 use crate::sim::hand::{self, NoPlace, Taken};
@@ -60,13 +61,24 @@ fn in_reach(state: &State, what: &str, at: &Point3<f64>) -> Result<(), Failure> 
 }
 
 impl SimRobot {
-    pub(super) fn push(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
+    /// Carries out a request of the arm.
+    pub(super) async fn handle(&self, request: &Request, watch: &Watch<'_>) -> Result<Answer, Failure> {
+        match request {
+            Request::PushAside(push) => self.push(push, watch).map(Answer::Pushed),
+            Request::OpenDoor(door) => self.open(door, watch).await.map(Answer::Opened),
+            Request::Grasp(grasp) => self.take(grasp, watch).await.map(Answer::Grasped),
+            Request::Place(placing) => self.put(placing, watch).await.map(Answer::Placed),
+            other => Err(other.beyond(self.description())),
+        }
+    }
+
+    fn push(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
         let mut state = self.lock();
         if state.held().is_some() {
             return Err(unable("the hand is full"));
         }
         in_reach(&state, "the object", &push.object)?;
-        if !(push.direction.norm() > 0.0 && push.distance_m.is_finite() && push.distance_m > 0.0) {
+        if !push.is_definite() {
             return Err(unreachable("a push needs a direction and a distance"));
         }
         let needed_s = PUSH_S + push.distance_m / HAND_M_S;
@@ -115,7 +127,7 @@ impl SimRobot {
         Ok(())
     }
 
-    pub(super) async fn take(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
+    async fn take(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
         {
             let state = self.lock();
             if state.held().is_some() {
@@ -159,7 +171,7 @@ impl SimRobot {
         }
     }
 
-    pub(super) async fn put(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
+    async fn put(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
         let object = {
             let state = self.lock();
             let object = state.held().ok_or_else(|| unable("the hand is empty"))?;
@@ -191,7 +203,7 @@ impl SimRobot {
         }
     }
 
-    pub(super) async fn open(&self, name: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
+    async fn open(&self, name: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
         let door = {
             let state = self.lock();
             let door = state.door(name).ok_or_else(|| unreachable(format!("there is no door \"{name}\"")))?;

@@ -1,14 +1,14 @@
 //! The simulated body in its room.
 
 use crate::body::{
-    CancellationToken, Colour, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing,
-    Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Scanned, Sensed, Stamp, StampedTransform,
-    Station, SurfaceHint, Travel, Watch,
+    CancellationToken, Colour, Door, Driven, Hand, Looked, Place, Pose2, PoseEstimate, Progress, Robot, Room,
+    Scanned, Sensed, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::head::{self, Gaze};
 use crate::parts::{Camera, Description};
+use crate::request::{Answer, Request};
 use crate::sim::body::{self, HEAD, HEAD_SPEED_RAD_S, RADIUS_M, SAFETY_M, SPEEDS};
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind, FaultPlan};
@@ -541,28 +541,10 @@ impl Robot for SimRobot {
         self.sweep()
     }
 
-    #[tracing::instrument(level = "debug", skip_all)]
-    async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
-        go_on(&watch.cancel, "the push")?;
-        self.push(push, watch)
-    }
-
-    #[tracing::instrument(level = "debug", skip_all, fields(%door))]
-    async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
-        go_on(&watch.cancel, "opening the door")?;
-        self.open(door, watch).await
-    }
-
-    #[tracing::instrument(level = "debug", skip_all)]
-    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
-        go_on(&watch.cancel, "the grasp")?;
-        self.take(grasp, watch).await
-    }
-
-    #[tracing::instrument(level = "debug", skip_all)]
-    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
-        go_on(&watch.cancel, "placing")?;
-        self.put(placing, watch).await
+    #[tracing::instrument(level = "debug", skip_all, fields(%request))]
+    async fn manipulate(&self, request: &Request, watch: &Watch<'_>) -> Result<Answer, Failure> {
+        go_on(&watch.cancel, request.name())?;
+        self.handle(request, watch).await
     }
 
     async fn hand(&self) -> Result<Hand, Failure> {

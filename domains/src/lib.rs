@@ -4,6 +4,7 @@ pub mod abilities;
 pub mod ability;
 pub mod actions;
 pub mod answer;
+mod arm;
 pub mod asked;
 pub mod belief;
 pub mod check;

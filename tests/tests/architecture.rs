@@ -402,7 +402,7 @@ const LAYERS: [(&str, &str); 4] = [
     ),
     (
         "world model",
-        "ability belief conclusion drive error eyes geometry known looking mind own_map range reasons round \
+        "ability arm belief conclusion drive error eyes geometry known looking mind own_map range reasons round \
          situation states surface viewpoint walls",
     ),
     ("abilities", "abilities"),

@@ -164,11 +164,8 @@ impl Asker<'_> {
         match word.objects.first()? {
             Some(name) => {
                 let thing = &s.things[s.thing(name).ok()?];
-                let is_it = |t: &&Track| match thing.track {
-                    Some(id) => t.id == id,
-                    None => t.probability_of(&thing.name) >= s.threshold,
-                };
-                let track = s.belief.tracks.iter().filter(is_there).find(is_it)?;
+                let mut there = s.belief.tracks.iter().filter(is_there);
+                let track = there.find(|track| s.is_taken_for(thing, track))?;
                 Some(format!("{} {}", the(&thing.name), self.standing(track)))
             }
             None => {

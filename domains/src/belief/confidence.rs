@@ -118,15 +118,18 @@ impl Situation {
         !self.spaces[on].seen_from().is_empty()
     }
 
+    /// True if a seen object is taken for the thing: by identity if the thing is a seen object, else by
+    /// probability.
+    pub(crate) fn is_taken_for(&self, thing: &Thing, track: &Track) -> bool {
+        match thing.track {
+            Some(id) => id == track.id,
+            None => track.probability_of(&thing.name) >= self.threshold,
+        }
+    }
+
     /// Seen objects that are none of the problem's things.
     pub(crate) fn strangers(&self) -> impl Iterator<Item = &Track> {
-        let is_thing = |track: &Track| {
-            let is_it = |thing: &Thing| match thing.track {
-                Some(id) => id == track.id,
-                None => track.probability_of(&thing.name) >= self.threshold,
-            };
-            self.things.iter().any(is_it)
-        };
+        let is_thing = |track: &Track| self.things.iter().any(|thing| self.is_taken_for(thing, track));
         self.belief.tracks.iter().filter(move |track| !is_thing(track))
     }
 }

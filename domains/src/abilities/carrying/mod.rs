@@ -6,15 +6,16 @@ mod spot;
 use std::sync::Arc;
 
 use descry_memory::belief::Track;
-use descry_perception::nalgebra::{Point3, Vector3};
+use descry_perception::nalgebra::Point3;
 use descry_planner::{Call, CallError};
-use descry_robots::{Answer, Description, Failure, Grasp, Part, Place, Placing};
+use descry_robots::{Answer, Failure, Grasp, Part, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
 use crate::ability::{Ability, ActionKind, Deed, Fact, Meaning, SkillWord, argument, quickest_first};
+use crate::arm;
 use crate::error::WorldError;
 use crate::eyes::Eyes;
-use crate::known::{Held, Thing};
+use crate::known::Held;
 use crate::looking::change::Change;
 use crate::looking::{looks, perceive};
 use crate::mind::Mind;
@@ -27,10 +28,6 @@ const TOUCHED_M: f64 = 0.03;
 /// Radius around the original place within which an object that slipped out of the hand may lie,
 /// metres.
 const SLIPPED_M: f64 = 0.15;
-/// Number of standard deviations of localisation that are allowed for as error.
-const ASTRAY: f64 = 2.0;
-/// Assumed distance between the body and an object that it looks at, metres.
-const FROM_M: f64 = 1.2;
 
 /// Skill that puts down the held object.
 const PUT_DOWN: &str = "put-down";
@@ -77,12 +74,12 @@ pub const ABILITY: Ability = Ability {
             about: "takes the thing into the hand and lifts it",
             ground: |s, arguments| {
                 let track =
-                    standing(s, arguments[1], arguments[2]).ok_or("it is not known where that stands")?;
-                let object = s.as_localised(&middle(s, track));
+                    s.standing(arguments[1], arguments[2]).ok_or("it is not known where that stands")?;
+                let object = s.as_localised(&s.on_axis(track, 0.5));
                 let grasp = Grasp { object, width_m: track.size_m[0].min(track.size_m[1]) };
                 Ok(Box::new(PickUp { grasp }))
             },
-            because: |s, arguments| format!("{} is to be elsewhere", thing_name(s, arguments[1])),
+            because: |s, arguments| format!("{} is to be elsewhere", s.thing_name(arguments[1])),
             learn: picked_up,
             failed: pick_up_failed,
         },
@@ -97,7 +94,7 @@ pub const ABILITY: Ability = Ability {
             },
             because: |s, arguments| {
                 let on = s.surface(arguments[2]).map_or(arguments[2], |on| &s.surfaces[on].name);
-                format!("{} is to be on the {on}", thing_name(s, arguments[1]))
+                format!("{} is to be on the {on}", s.thing_name(arguments[1]))
             },
             learn: put_down,
             failed: put_down_failed,
@@ -111,8 +108,8 @@ pub const ABILITY: Ability = Ability {
 /// Fallback: the view with the highest gain per second; a held object is first put down where that
 /// is quickest.
 fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
-    let Some(track) = held(s) else { return looks::look_deeds(s) };
-    let Some(thing) = s.things.iter().find(|thing| is_held(s, thing, track)) else { return Vec::new() };
+    let Some(track) = s.in_hand() else { return looks::look_deeds(s) };
+    let Some(thing) = s.things.iter().find(|thing| s.is_taken_for(thing, track)) else { return Vec::new() };
     let poses = (0..s.candidates.len()).filter(|&from| s.can_drive_to(from));
     let spots = poses.flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
     let free = spots.filter(|&(from, on)| spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some());
@@ -125,33 +122,19 @@ fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
 
 /// States `(holding ?thing)` for every thing that the object in the hand is taken for.
 fn holding(s: &Situation) -> Vec<String> {
-    let Some(track) = held(s) else { return Vec::new() };
-    let held = s.things.iter().filter(|thing| is_held(s, thing, track));
+    let Some(track) = s.in_hand() else { return Vec::new() };
+    let held = s.things.iter().filter(|thing| s.is_taken_for(thing, track));
     held.map(|thing| format!("(holding {})", thing.symbol)).collect()
 }
 
 /// Bounds on `(holding ?thing)`: exactly 1 or 0, since the object in the hand is always a known one.
 fn is_in_hand(s: &Situation, of: &[Referent<'_>]) -> Range {
     let is_it = |track: &Track| match of {
-        [Referent::Named(name)] => s.things.iter().any(|t| t.symbol == **name && is_held(s, t, track)),
+        [Referent::Named(name)] => s.things.iter().any(|t| t.symbol == **name && s.is_taken_for(t, track)),
         [Referent::Seen(seen)] => seen.id == track.id,
         _ => false,
     };
-    Range::exactly(f64::from(u8::from(held(s).is_some_and(is_it))))
-}
-
-/// True if the object in the hand is the thing: by identity if the thing is a seen object, else by
-/// probability.
-fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
-    match thing.track {
-        Some(id) => id == track.id,
-        None => track.probability_of(&thing.name) >= s.threshold,
-    }
-}
-
-/// Name of the thing with a symbol; the symbol itself if there is no such thing.
-fn thing_name<'a>(s: &'a Situation, symbol: &'a str) -> &'a str {
-    s.thing(symbol).map_or(symbol, |n| &s.things[n].name)
+    Range::exactly(f64::from(u8::from(s.in_hand().is_some_and(is_it))))
 }
 
 /// States `(hand-free)` while nothing is held, also for a body without a hand, which can still look;
@@ -160,61 +143,16 @@ fn hand_free(s: &Situation) -> Vec<String> {
     if s.held.is_none() { vec!["(hand-free)".into()] } else { Vec::new() }
 }
 
-/// Object in the hand; `None` if the hand is empty.
-fn held(s: &Situation) -> Option<&Track> {
-    let held = s.held.as_ref()?;
-    s.belief.tracks.iter().find(|t| t.id == held.track)
-}
-
-/// Object on a surface that is most likely the thing; `None` if none reaches the confidence threshold.
-fn standing<'a>(s: &'a Situation, thing: &str, surface: &str) -> Option<&'a Track> {
-    let thing = &s.things[s.thing(thing).ok()?];
-    let there = s.belief.tracks.iter().filter(|t| t.on == surface);
-    let p =
-        |t: &Track| if thing.track.is_none_or(|id| id == t.id) { t.probability_of(&thing.name) } else { 0.0 };
-    there.max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) >= s.threshold)
-}
-
-/// Centre of an object's body, half its height above its foot point; map frame.
-fn middle(s: &Situation, track: &Track) -> Point3<f64> {
-    let up = s.surface_of(track).map_or_else(Vector3::z, |on| s.surfaces[on].up);
-    track.position_m + up * (0.5 * track.size_m[2])
-}
-
-/// Horizontal distance of a point from the body at a candidate, metres; `None` with a wall in between or
-/// at a station.
-fn distance_m(s: &Situation, from: usize, p: &Point3<f64>) -> Option<f64> {
-    let Place::Pose(base) = &s.candidates[from].place else { return None };
-    (!s.is_walled_off(&base.point(), &p.xy())).then(|| (p.xy() - base.point()).norm())
-}
-
-/// Localisation error to allow for at an object seen from [`FROM_M`], metres.
-fn astray_m(body: &Description) -> f64 {
-    ASTRAY * (body.pose_sigma_m + body.pose_sigma_rad * FROM_M)
-}
-
-/// True if the hand reaches a point from a candidate with no wall in between and with a margin for
-/// localisation error. The candidate nearest to the point needs no margin.
-fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
-    let body = s.robot.description();
-    let Some((d_m, reach_m)) = distance_m(s, from, p).zip(body.reach_m()) else { return false };
-    let is_nearest = || {
-        let others = (0..s.candidates.len()).filter(|&other| s.can_drive_to(other));
-        others.filter_map(|other| distance_m(s, other, p)).all(|other_m| d_m <= other_m)
-    };
-    d_m <= reach_m && (d_m + astray_m(body) <= reach_m || is_nearest())
-}
-
 /// Answers `[can-grasp ?from ?what ?on]`; an object not found yet is assumed to be at the centre of the
 /// surface.
 fn can_grasp(s: &Situation, call: &Call) -> Result<descry_planner::Answer, CallError> {
     let from = s.candidate(argument(call, 0)?)?;
     let body = s.robot.description();
-    let within = |p: Point3<f64>| reaches(s, from, &p);
-    let can = match standing(s, argument(call, 1)?, argument(call, 2)?) {
+    let within = |p: Point3<f64>| s.reaches(from, &p);
+    let can = match s.standing(argument(call, 1)?, argument(call, 2)?) {
         Some(track) => {
             let width_m = track.size_m[0].min(track.size_m[1]);
-            within(middle(s, track)) && body.hand().is_some_and(|hand| width_m <= hand.opening_m)
+            within(s.on_axis(track, 0.5)) && body.hand().is_some_and(|hand| width_m <= hand.opening_m)
         }
         None => {
             let on = s.surface(argument(call, 2)?)?;
@@ -235,7 +173,7 @@ fn can_put(s: &Situation, call: &Call) -> Result<descry_planner::Answer, CallErr
 fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let on = s.surface(arguments[2]).map_err(|e| e.to_string())?;
-    let radius_m = held(s).map_or(spot::USUAL_RADIUS_M, |t| 0.5 * t.size_m[0].max(t.size_m[1]));
+    let radius_m = s.in_hand().map_or(spot::USUAL_RADIUS_M, |t| 0.5 * t.size_m[0].max(t.size_m[1]));
     spot::free(s, from, on, radius_m, false)
         .ok_or_else(|| format!("there is no free place within reach on {}", arguments[2]))
 }
@@ -250,7 +188,7 @@ fn void(mind: &mut Mind, eyes: Eyes<'_>, track: &Track, more_m: f64) -> Result<(
         foot: track.position_m,
         up: mind.known.surfaces[on].up,
         // Where the hand was, and where a view was taken from, localisation says.
-        radius_m: 0.5 * track.size_m[0].max(track.size_m[1]) + more_m + astray_m(body),
+        radius_m: 0.5 * track.size_m[0].max(track.size_m[1]) + more_m + arm::astray_m(body),
         height_m: track.size_m[2] + TOUCHED_M,
     };
     perceive::something_moved(mind, eyes.record, on, change)
@@ -265,7 +203,7 @@ fn picked_up(
     _: &mut Vec<Note>,
 ) -> Result<String, WorldError> {
     let Outcome::Grasped(grasped, _) = outcome else { return Err(WorldError::strange(outcome)) };
-    let track = standing(s, arguments[1], arguments[2]).cloned();
+    let track = s.standing(arguments[1], arguments[2]).cloned();
     let track = track.ok_or_else(|| WorldError::Bug(format!("`{}` was taken from nowhere", arguments[1])))?;
     void(mind, eyes, &track, TOUCHED_M)?;
     let belief = Arc::make_mut(&mut mind.known.belief);
@@ -283,7 +221,7 @@ fn pick_up_failed(
     failure: &SkillFailure,
 ) -> Result<Option<String>, WorldError> {
     if let (SkillFailure::Body(Failure::Slipped { .. }), Some(track)) =
-        (failure, standing(s, arguments[1], arguments[2]))
+        (failure, s.standing(arguments[1], arguments[2]))
     {
         void(mind, eyes, track, SLIPPED_M)?;
         // Where it stands now, the next look will say.

@@ -3,7 +3,6 @@
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};
 
-use super::{distance_m, reaches};
 use crate::situation::Situation;
 
 /// Radius assumed for an unknown object, that of a cup with its handle, metres.
@@ -48,7 +47,7 @@ pub(super) fn free(
             (t.position_m - p).norm() >= own + radius_m + GAP_M
         })
     };
-    let near = |p: &Point3<f64>| distance_m(s, from, p).filter(|_| reaches(s, from, p));
+    let near = |p: &Point3<f64>| s.distance_m(from, p).filter(|_| s.reaches(from, p));
     (-steps..=steps)
         .flat_map(|i| (-steps..=steps).map(move |j| (i, j)))
         .map(|(i, j)| centre + (e1 * i as f64 + e2 * j as f64) * GRID_M)

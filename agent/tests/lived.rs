@@ -28,9 +28,22 @@ pub fn lived(
     seed: u64,
     policy: &str,
 ) -> Result<Lived, CommandError> {
+    lived_after(None, domain, said, scene, seed, policy)
+}
+
+/// The same after other runs, if any, that left what is in a store.
+pub fn lived_after(
+    store: Option<&str>,
+    domain: &Domain,
+    said: &str,
+    scene: &str,
+    seed: u64,
+    policy: &str,
+) -> Result<Lived, CommandError> {
     let scratch = tempfile::TempDir::new().expect("a folder can be made");
     let body = body::open("sim", Some(scene), seed, domain)?;
-    let understood = run::understood(said, domain, &*body.robot, None)?;
+    let past = run::recall(store)?;
+    let understood = run::understood(said, domain, &*body.robot, past.as_ref())?;
     let settings = Settings {
         robot: "sim".into(),
         scene: Some(scene.into()),
@@ -38,7 +51,7 @@ pub fn lived(
         domain: domain.config.name.clone(),
         policy: policy.into(),
         keeping: Keeping::default(),
-        remember: None,
+        remember: store.map(str::to_string),
     };
     let folder = Folder::of_new_run(Some(&scratch.path().join("run")), &understood)?;
     let mut done: Vec<(Call, bool)> = Vec::new();
@@ -57,7 +70,7 @@ pub fn lived(
     let before = truth();
     let watcher = Watcher { stop: &Stop::default(), tell: &mut hear };
     let chooser = policies::named(policy, seed, None).expect("a policy");
-    let task = Task { domain, goal: &understood, past: None };
+    let task = Task { domain, goal: &understood, past: past.as_ref() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     let report = runtime.block_on(run::pursue(task, &body, &folder, &settings, chooser, watcher))?;
     Ok(Lived { report, done, truth: [before, truth()] })

@@ -17,6 +17,7 @@ mod colours;
 mod example;
 mod goals;
 mod lived;
+mod pouring;
 mod renamed;
 mod sensor_faults;
 mod unit;

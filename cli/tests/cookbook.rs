@@ -54,6 +54,7 @@ recipes! {
     courier 8
     tea 9
     benches 10
+    pour 11
 }
 
 #[test]

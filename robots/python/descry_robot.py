@@ -83,6 +83,10 @@ class Robot:
         """`{}`."""
         raise Failure("unable", "there is no hand")
 
+    def pour(self, request, over):
+        """`{"litres": how much went over}`: all that the held vessel holds."""
+        raise Failure("unable", "pouring is beyond it")
+
     def hand(self, request):
         """`{"holds": true or false}`."""
         raise Failure("unable", "there is no hand")
@@ -91,7 +95,7 @@ class Robot:
         """Comes to a halt at once: called when a request was stopped and when nobody is left to ask."""
 
 
-REQUESTS = ("pose", "drive_to", "look_at", "sense", "scan", "read", "push_aside", "open_door", "grasp", "place", "hand")
+REQUESTS = ("pose", "drive_to", "look_at", "sense", "scan", "read", "push_aside", "open_door", "grasp", "place", "pour", "hand")
 
 
 class Request:

@@ -258,6 +258,23 @@ pub struct Placed {
     pub duration_s: f64,
 }
 
+/// Request to pour out all that the held vessel holds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pouring {
+    /// Centre of the rim of the vessel to pour into, map frame, metres.
+    pub over: Point3<f64>,
+}
+
+/// Result of a completed pour: the held vessel is empty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Poured {
+    /// Volume that went over, litres; 0 if the held vessel was empty.
+    pub litres: f64,
+    /// Duration on the body's clock, seconds.
+    pub duration_s: f64,
+}
+
 /// State of the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hand {

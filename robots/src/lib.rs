@@ -17,8 +17,8 @@ pub mod truth;
 pub use async_trait::async_trait;
 pub use body::{
     CancellationToken, Colour, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing,
-    Pose2, PoseEstimate, Progress, Push, Pushed, Reading, Robot, Room, Scanned, Sensed, Stamp,
-    StampedTransform, Station, SurfaceHint, Travel, Watch,
+    Pose2, PoseEstimate, Poured, Pouring, Progress, Push, Pushed, Reading, Robot, Room, Scanned, Sensed,
+    Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 pub use descry_perception as perception;
 pub use failure::Failure;

@@ -1,8 +1,8 @@
 //! Requests to a body and its answers as values, for recording, replay, robot programs and conformance tests.
 
 use crate::body::{
-    Colour, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate, Push, Pushed,
-    Reading, Robot, Scanned, Sensed, Stamp, StampedTransform, Watch,
+    Colour, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate, Poured,
+    Pouring, Push, Pushed, Reading, Robot, Scanned, Sensed, Stamp, StampedTransform, Watch,
 };
 use crate::failure::Failure;
 use crate::parts::{Description, Part};
@@ -34,6 +34,8 @@ pub enum Request {
     Grasp(Grasp),
     /// Put down the held object: [`Robot::place`].
     Place(Placing),
+    /// Pour what the held vessel holds into another one: [`Robot::manipulate`].
+    Pour(Pouring),
     /// Report the state of the hand: [`Robot::hand`].
     Hand,
 }
@@ -52,6 +54,7 @@ impl Request {
             Request::OpenDoor(_) => "open_door",
             Request::Grasp(_) => "grasp",
             Request::Place(_) => "place",
+            Request::Pour(_) => "pour",
             Request::Hand => "hand",
         }
     }
@@ -64,7 +67,7 @@ impl Request {
             Request::LookAt(_) | Request::Sense => Some(Part::Camera),
             Request::Scan => Some(Part::Laser),
             Request::PushAside(_) => Some(Part::Arm),
-            Request::Grasp(_) | Request::Place(_) | Request::Hand => Some(Part::Hand),
+            Request::Grasp(_) | Request::Place(_) | Request::Pour(_) | Request::Hand => Some(Part::Hand),
         }
     }
 
@@ -74,6 +77,7 @@ impl Request {
             Request::PushAside(push) => Some(&push.object),
             Request::Grasp(grasp) => Some(&grasp.object),
             Request::Place(placing) => Some(&placing.foot),
+            Request::Pour(pouring) => Some(&pouring.over),
             _ => None,
         }
     }
@@ -94,9 +98,11 @@ impl Request {
             Request::LookAt(point) => body.look_at(point, watch).await.map(Answer::Looked),
             Request::Scan => body.scan(watch).await.map(Answer::Scanned),
             Request::Read(sense) => body.read(sense, watch).await.map(Answer::Read),
-            Request::PushAside(_) | Request::OpenDoor(_) | Request::Grasp(_) | Request::Place(_) => {
-                body.manipulate(self, watch).await
-            }
+            Request::PushAside(_)
+            | Request::OpenDoor(_)
+            | Request::Grasp(_)
+            | Request::Place(_)
+            | Request::Pour(_) => body.manipulate(self, watch).await,
             Request::Hand => body.hand().await.map(Answer::Hand),
             Request::Sense => match body.sense(watch).await {
                 Ok(sensed) => return (Answer::Sensed(Exposure::of(&sensed)), Some(sensed)),
@@ -120,6 +126,7 @@ impl std::fmt::Display for Request {
             Request::OpenDoor(door) => write!(f, "open {door}"),
             Request::Grasp(grasp) => write!(f, "take what stands at {}", grasp.object),
             Request::Place(placing) => write!(f, "put down what it holds at {}", placing.foot),
+            Request::Pour(pouring) => write!(f, "pour what it holds out at {}", pouring.over),
             Request::Hand => write!(f, "say what the hand feels"),
         }
     }
@@ -149,6 +156,8 @@ pub enum Answer {
     Grasped(Grasped),
     /// Completed placement, for [`Request::Place`].
     Placed(Placed),
+    /// Completed pour, for [`Request::Pour`].
+    Poured(Poured),
     /// State of the hand, for [`Request::Hand`].
     Hand(Hand),
     /// Failure of any request.

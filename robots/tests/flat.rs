@@ -1,11 +1,13 @@
 //! A flat: rooms, walls and doors, boards, a hand, and faults.
 
 use descry_robots::conformance;
-use descry_robots::nalgebra::{Point2, Point3};
+use descry_robots::nalgebra::{Point2, Point3, Vector3};
 use descry_robots::sim::world::LABEL_ROOM;
 use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::truth::TrueObject;
-use descry_robots::{Failure, Grasp, Place, Placing, Pose2, Robot, Travel, Watch};
+use descry_robots::{
+    Answer, Failure, Grasp, Place, Placing, Pose2, Poured, Pouring, Request, Robot, Travel, Watch,
+};
 
 const FLAT: &str = r#"
 [[room]]
@@ -365,6 +367,45 @@ async fn a_hand_has_limits() {
     assert!(cup.centre_m.x <= -1.6 - 0.035 + 1e-9, "{}", cup.centre_m);
     let empty = robot.place(&place(Point3::new(-1.9, 0.0, 0.75)), &watch).await;
     assert!(matches!(empty, Err(Failure::Unable { .. })), "{empty:?}");
+}
+
+/// Pours a cup of 0.2 l at a distance from the centre of a bowl with some content; returns the answer and the last event.
+async fn pour(in_bowl_l: f64, aside_m: f64, takes: bool) -> (Result<Answer, Failure>, String) {
+    let cup = "shape.cup = { diameter_m = 0.07, height_m = 0.1 }";
+    let bowl =
+        "name = \"bowl\"\nshape.cup = { diameter_m = 0.16, height_m = 0.08 }\nposition_m = [0.3, -0.15]";
+    let text = FLAT.replace(cup, &format!("{cup}\nholds_l = 0.2"));
+    let robot =
+        robot_in(&format!("{text}[[object]]\n{bowl}\non = \"table\"\nholds_l = {in_bowl_l}\n"), 3, "");
+    drive(&robot, &at(-1.2, 0.2)).await.unwrap();
+    if takes {
+        take(&robot, "cup", 0.07).await;
+    }
+    let over = object(&robot, "bowl").centre_m + Vector3::new(aside_m, 0.0, 0.04);
+    let answer = robot.manipulate(&Request::Pour(Pouring { over }), &Watch::default()).await;
+    (answer, robot.truth().events.last().map_or(String::new(), |event| event.what.clone()))
+}
+
+#[tokio::test]
+async fn a_vessel_is_emptied_into_the_one_below_or_spilt() {
+    let (poured, said) = pour(0.0, 0.0, true).await;
+    assert!(matches!(poured, Ok(Answer::Poured(Poured { litres: 0.2, .. }))), "{poured:?}");
+    assert_eq!(said, "the hand pours 0.20 l of \"cup\" into \"bowl\"");
+    for (in_bowl_l, aside_m, said) in
+        [(0.0, 0.2, "0.20 l of \"cup\" are spilt"), (1.4, 0.0, "0.17 l of \"cup\" run over \"bowl\"")]
+    {
+        let (spilt, event) = pour(in_bowl_l, aside_m, true).await;
+        assert!(matches!(spilt, Err(Failure::Slipped { .. })), "{spilt:?}");
+        assert_eq!(event, said);
+    }
+    let (far, event) = pour(0.0, 3.0, true).await;
+    assert!(matches!(far, Err(Failure::Unreachable { .. })) && !event.contains(" l "), "{far:?}, {event}");
+    let (empty, _) = pour(0.0, 0.0, false).await;
+    assert!(matches!(empty, Err(Failure::Unable { .. })), "{empty:?}");
+    let too_full =
+        FLAT.replace("height_m = 0.1 }\nposition_m", "height_m = 0.1 }\nholds_l = 3.0\nposition_m");
+    let refused = SceneSpec::parse("flat.toml", &too_full).unwrap_err().to_string();
+    assert!(refused.contains("3 l are not in it") && refused.contains("0 to 0.31 l"), "{refused}");
 }
 
 #[tokio::test]

@@ -4,6 +4,7 @@
 pub mod carrying;
 pub mod learning;
 pub mod moving;
+pub mod pouring;
 pub mod reading;
 pub mod searching;
 pub mod shapes;
@@ -16,6 +17,7 @@ pub const ALL: &[&Ability] = &[
     &moving::ABILITY,
     &searching::ABILITY,
     &carrying::ABILITY,
+    &pouring::ABILITY,
     &reading::ABILITY,
     &shapes::ABILITY,
     &surveying::ABILITY,

@@ -1,9 +1,10 @@
 //! Conformance of the hand; bodies without a hand must say so.
 
 use super::{Breach, done, ensure};
-use crate::body::{CancellationToken, Grasp, Place, Placing, Robot, Watch};
+use crate::body::{CancellationToken, Grasp, Place, Placing, Pouring, Robot, Watch};
 use crate::failure::Failure;
 use crate::parts::Gripper;
+use crate::request::{Answer, Request};
 use nalgebra::Point3;
 
 /// Maximum number of tries to grasp, since the hand may slip.
@@ -21,6 +22,12 @@ pub(super) async fn check_hand(robot: &dyn Robot) -> Result<(), Breach> {
     ensure(
         matches!(answer, Err(Failure::Unable { .. })),
         "an empty hand, or none, puts nothing down",
+        || format!("{answer:?}"),
+    )?;
+    let (answer, _) = Request::Pour(Pouring { over: in_air }).ask(robot, &watch).await;
+    ensure(
+        matches!(answer, Answer::Failed(Failure::Unable { .. })),
+        "an empty hand, or none, pours nothing",
         || format!("{answer:?}"),
     )?;
     let Some(Gripper { opening_m }) = robot.description().hand().copied() else { return Ok(()) };

@@ -12,7 +12,7 @@ mod sight;
 pub use hand::check_carrying;
 
 use crate::body::{
-    CancellationToken, Grasp, Place, Placing, Pose2, Progress, Push, Robot, Sensed, Stamp, Watch,
+    CancellationToken, Grasp, Place, Placing, Pose2, Pouring, Progress, Push, Robot, Sensed, Stamp, Watch,
 };
 use crate::failure::Failure;
 use crate::parts::{Base, Camera, Description};
@@ -383,6 +383,7 @@ async fn check_missing_parts(robot: &dyn Robot, map_from_base: &Isometry3<f64>) 
         Request::PushAside(Push { object, direction: Vector2::x(), distance_m: 0.1 }),
         Request::Grasp(Grasp { object, width_m: 0.05 }),
         Request::Place(Placing { foot: object }),
+        Request::Pour(Pouring { over: object }),
         Request::Hand,
     ];
     for request in requests {

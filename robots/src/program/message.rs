@@ -1,6 +1,6 @@
 //! Messages of the protocol, with their checks.
 
-use crate::body::{Grasp, Grasped, Opened, Place, Placed, Placing, Push, Pushed, Stamp};
+use crate::body::{Grasp, Grasped, Opened, Place, Placed, Placing, Poured, Pouring, Push, Pushed, Stamp};
 use crate::failure::Failure;
 use crate::request::{Answer, Request};
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion};
@@ -34,6 +34,7 @@ pub(super) enum Arguments<'a> {
     Door { door: &'a str },
     Grasp(&'a Grasp),
     Place(&'a Placing),
+    Pour(&'a Pouring),
 }
 
 impl<'a> Arguments<'a> {
@@ -48,6 +49,7 @@ impl<'a> Arguments<'a> {
             Request::OpenDoor(door) => Arguments::Door { door },
             Request::Grasp(grasp) => Arguments::Grasp(grasp),
             Request::Place(placing) => Arguments::Place(placing),
+            Request::Pour(pouring) => Arguments::Pour(pouring),
         }
     }
 }
@@ -193,6 +195,14 @@ pub(super) struct GraspedSaid {
     pub width_m: f64,
 }
 
+/// Answer to `pour`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PouredSaid {
+    /// Volume that went over, litres.
+    pub litres: f64,
+}
+
 /// Empty answer to `open_door` and `place`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -220,6 +230,10 @@ pub(super) fn manipulated(request: &Request, said: Value, duration_s: f64) -> Re
         Request::Place(_) => {
             let NothingSaid {} = answer(name, said)?;
             Answer::Placed(Placed { duration_s })
+        }
+        Request::Pour(_) => {
+            let PouredSaid { litres } = answer(name, said)?;
+            Answer::Poured(Poured { litres: amount("litres", litres)?, duration_s })
         }
         other => return Err(format!("{other} is nothing for an arm")),
     })

@@ -259,6 +259,7 @@ fn place<'a>(
     gap_m: f64,
     rng: &mut ChaCha8Rng,
 ) -> Option<Object> {
+    let holds_l = o.holds_l.min(shape.capacity_l());
     let mut object = Object {
         name: o.name.clone(),
         kind: o.kind.clone().unwrap_or_else(|| o.name.clone()),
@@ -266,6 +267,7 @@ fn place<'a>(
         colour: o.colour,
         stands: Stand::On(surface.name.clone()),
         map_from_object: surface.map_from_top(),
+        holds_l,
     };
     let fixed = o.position_m.is_some();
     let tries = if fixed { 1 } else { PLACES };

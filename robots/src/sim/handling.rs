@@ -1,6 +1,8 @@
 //! Arm of the simulated body: pushing, grasping, placing, opening doors.
 
-use crate::body::{Grasp, Grasped, Opened, Placed, Placing, Pose2, Progress, Push, Pushed, Robot, Watch};
+use crate::body::{
+    Grasp, Grasped, Opened, Placed, Placing, Pose2, Poured, Pouring, Progress, Push, Pushed, Robot, Watch,
+};
 use crate::failure::Failure;
 use crate::request::{Answer, Request};
 use crate::sim::body::{HAND_OPENING_M, REACH_M};
@@ -22,6 +24,8 @@ const SLIPPED_SHARE: f64 = 0.5;
 const GRASP_S: f64 = 12.0;
 /// Duration of a placement, from the first move of the arm until the hand is withdrawn, seconds.
 const PLACE_S: f64 = 10.0;
+/// Duration of a pour, from the first move of the arm until the vessel is upright again, seconds.
+const POUR_S: f64 = 8.0;
 /// Duration of opening a door, seconds.
 const DOOR_S: f64 = 6.0;
 /// Maximum distance of the base from the centre of a door to open it, metres.
@@ -68,6 +72,7 @@ impl SimRobot {
             Request::OpenDoor(door) => self.open(door, watch).await.map(Answer::Opened),
             Request::Grasp(grasp) => self.take(grasp, watch).await.map(Answer::Grasped),
             Request::Place(placing) => self.put(placing, watch).await.map(Answer::Placed),
+            Request::Pour(pouring) => self.pour(pouring, watch).await.map(Answer::Poured),
             other => Err(other.beyond(self.description())),
         }
     }
@@ -201,6 +206,33 @@ impl SimRobot {
                 Err(Failure::Blocked { because: "something stands there".into(), by: None })
             }
         }
+    }
+
+    async fn pour(&self, pouring: &Pouring, watch: &Watch<'_>) -> Result<Poured, Failure> {
+        let held = {
+            let state = self.lock();
+            let held = state.held().ok_or_else(|| unable("the hand is empty"))?;
+            in_reach(&state, "the vessel", &pouring.over)?;
+            held
+        };
+        self.work("pouring", POUR_S, watch).await?;
+        let mut state = self.lock();
+        let over = state.truth_from_estimate() * pouring.over;
+        let objects = &mut state.scene.objects;
+        let litres = std::mem::take(&mut objects[held].holds_l);
+        let held = objects[held].name.clone();
+        let Some(into) = objects.iter_mut().find(|o| o.is_in_place() && o.has_opening_at(&over)) else {
+            state.note(format!("{litres:.2} l of \"{held}\" are spilt"));
+            return Err(slipped("there is no vessel below"));
+        };
+        let (room_l, name) = (into.shape.capacity_l() - into.holds_l, into.name.clone());
+        into.holds_l += litres.min(room_l);
+        if litres > room_l {
+            state.note(format!("{:.2} l of \"{held}\" run over \"{name}\"", litres - room_l));
+            return Err(slipped("it ran over"));
+        }
+        state.note(format!("the hand pours {litres:.2} l of \"{held}\" into \"{name}\""));
+        Ok(Poured { litres, duration_s: POUR_S })
     }
 
     async fn open(&self, name: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {

@@ -257,6 +257,28 @@ impl Shape {
         shape
     }
 
+    /// Inside of an open vessel; `None` for what is closed or composed.
+    fn inside(&self) -> Option<Inside> {
+        match self {
+            Shape::Cup(c) => Some(Inside::of(c.diameter_m, c.base_diameter_m, c.height_m, c.wall_m)),
+            Shape::Mug(m) => Some(Inside::of(m.diameter_m, m.base_diameter_m, m.height_m, m.wall_m)),
+            _ => None,
+        }
+    }
+
+    /// Radius of its opening, metres; 0 if it has none.
+    pub fn opening_m(&self) -> f64 {
+        self.inside().map_or(0.0, |inside| inside.rim_m)
+    }
+
+    /// Volume that it can hold, litres.
+    pub fn capacity_l(&self) -> f64 {
+        let volume = |Inside { bottom_m: a, rim_m: b, depth_m }| {
+            1e3 * std::f64::consts::FRAC_PI_3 * depth_m * (a * a + a * b + b * b)
+        };
+        self.inside().map_or(0.0, volume)
+    }
+
     fn round_radius_m(&self) -> f64 {
         let diameter = match self {
             Shape::Cup(c) => c.diameter_m.max(c.base_diameter_m.unwrap_or(0.0)),
@@ -344,15 +366,29 @@ fn handle_centre_m(m: &Mug) -> f64 {
     0.25 * (m.diameter_m + m.base_diameter_m.unwrap_or(m.diameter_m))
 }
 
+/// Hollow space of an open vessel, a frustum: radius at the bottom and at the rim, and depth, metres.
+struct Inside {
+    bottom_m: f64,
+    rim_m: f64,
+    depth_m: f64,
+}
+
+impl Inside {
+    fn of(diameter_m: f64, base_diameter_m: Option<f64>, height_m: f64, wall_m: f64) -> Self {
+        let (rim, base) = (0.5 * diameter_m, 0.5 * base_diameter_m.unwrap_or(diameter_m));
+        let slope = (rim - base) / height_m;
+        Self { bottom_m: base + slope * wall_m - wall_m, rim_m: rim - wall_m, depth_m: height_m - wall_m }
+    }
+}
+
 fn shell(diameter_m: f64, base_diameter_m: Option<f64>, height_m: f64, wall_m: f64) -> Vec<Primitive> {
     let (rim, base) = (0.5 * diameter_m, 0.5 * base_diameter_m.unwrap_or(diameter_m));
-    let slope = (rim - base) / height_m;
-    let inner_base = base + slope * wall_m - wall_m;
+    let inside = Inside::of(diameter_m, base_diameter_m, height_m, wall_m);
     vec![
         Primitive::frustum(base, rim, 0.0, height_m),
-        Primitive::frustum(inner_base, rim - wall_m, wall_m, height_m),
-        Primitive::Disc { z_m: height_m, inner_m: rim - wall_m, outer_m: rim },
-        Primitive::Disc { z_m: wall_m, inner_m: 0.0, outer_m: inner_base },
+        Primitive::frustum(inside.bottom_m, inside.rim_m, wall_m, height_m),
+        Primitive::Disc { z_m: height_m, inner_m: inside.rim_m, outer_m: rim },
+        Primitive::Disc { z_m: wall_m, inner_m: 0.0, outer_m: inside.bottom_m },
         Primitive::Disc { z_m: 0.0, inner_m: 0.0, outer_m: base },
     ]
 }

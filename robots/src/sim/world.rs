@@ -45,9 +45,18 @@ pub struct Object {
     /// Pose of the object in the map, with the origin at the centre of its base; the last one while it is
     /// held or taken away.
     pub map_from_object: Isometry3<f64>,
+    /// Volume of the liquid in it, litres.
+    #[serde(default)]
+    pub holds_l: f64,
 }
 
 impl Object {
+    /// True if a point of the map lies over its opening, and not below its rim by more than its own height.
+    pub fn has_opening_at(&self, p: &Point3<f64>) -> bool {
+        let p = self.map_from_object.inverse_transform_point(p);
+        p.xy().coords.norm() < self.shape.opening_m() && p.z > 0.0
+    }
+
     /// Centre of the object's bounding box without a handle, map frame, metres.
     pub fn centre_m(&self) -> Point3<f64> {
         let middle = match &self.shape {

@@ -47,6 +47,9 @@ pub struct ObjectSpec {
     /// Red, green, blue.
     #[serde(default = "default_grey")]
     pub colour: [u8; 3],
+    /// Volume of the liquid in it, litres.
+    #[serde(default)]
+    pub holds_l: f64,
     /// The visits in which the object is present; all if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visits: Vec<usize>,
@@ -88,6 +91,13 @@ impl SceneSpec {
             ));
         }
         check_shape(&o.shape, &at("shape"))?;
+        if !(0.0..=o.shape.capacity_l()).contains(&o.holds_l) {
+            return Err(object(
+                &at("holds_l"),
+                format!("{} l are not in it", o.holds_l),
+                format!("0 to {:.2} l are, by its shape", o.shape.capacity_l()),
+            ));
+        }
         self.check_on(o, &at)?;
         self.check_apart(i, o, &at)?;
         if let Some(area) = o.area_m {

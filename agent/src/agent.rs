@@ -223,10 +223,10 @@ impl<'a> Agent<'a> {
         round: &Round,
         reason: &Reason,
         calls: Vec<(String, u64)>,
-        choose: fn(&mut World<'w>, &Round) -> Result<Choice, WorldError>,
+        choose: fn(&mut World<'w>, &Round) -> Choice,
     ) -> Result<Taken, CommandError> {
         loop {
-            match choose(world, round)? {
+            match choose(world, round) {
                 Choice::Nothing(why) => return Ok(Taken::Nothing(why)),
                 Choice::Planner => return Ok(Taken::LeftToPlanner),
                 Choice::Steps(plan) => {

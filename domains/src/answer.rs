@@ -47,7 +47,9 @@ pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
     let with_reason = |own: String| reason().map_or(own.clone(), |reason| format!("{own}: {reason}"));
     let why = asker.worded(verdict).map_or(why, with_reason);
     let own = s.things.iter().filter(|t| t.track.is_none()).count();
+    let judged = asker.judgement();
     let confidence = match (own, s.kinds.is_empty(), s.asked.first()) {
+        _ if asker.goal.question && judged.value != Truth::Unknown => judged.sure,
         (1.., _, _) => (0..own).map(|n| s.confidence(n)).fold(1.0, f64::min),
         (_, false, _) => (0..s.kinds.len()).map(|n| s.completeness(n)).fold(1.0, f64::min),
         (_, _, Some(_)) => s.asked.iter().map(|&on| s.clarity(on)).fold(1.0, f64::min),
@@ -108,7 +110,7 @@ impl Asker<'_> {
         if let Some(unknown) = self.nowhere() {
             return (Verdict::CannotTell, unknown);
         }
-        let Judgement { value, word } = self.judgement();
+        let Judgement { value, word, .. } = self.judgement();
         match value {
             Truth::True => {}
             Truth::Unknown => return (Verdict::CannotTell, self.open(word.as_ref())),
@@ -240,7 +242,7 @@ impl Asker<'_> {
         if (is_beyond_looks || is_beyond_the_body) && is_proven {
             return (Verdict::Impossible, self.impossible(&says));
         }
-        let Judgement { value, word } = self.judgement();
+        let Judgement { value, word, .. } = self.judgement();
         if value == Truth::True {
             return self.reached();
         }

@@ -56,6 +56,8 @@ pub struct Judgement {
     pub value: Truth,
     /// Deciding fact; `None` for a condition without facts.
     pub word: Option<Decisive>,
+    /// Probability that the truth value is right: the least of those of the facts that it rests on.
+    pub sure: f64,
 }
 
 /// Predicate or function, with its objects, that decides a condition or leaves it open.
@@ -82,8 +84,11 @@ impl Decisive {
 }
 
 impl Judgement {
+    /// Judgement of a condition that cannot be evaluated.
+    pub const UNKNOWN: Judgement = Judgement { value: Truth::Unknown, word: None, sure: 1.0 };
+
     fn of(value: Truth) -> Judgement {
-        Judgement { value, word: None }
+        Judgement { value, word: None, sure: 1.0 }
     }
 
     /// True if the condition is open and views may decide it.
@@ -145,8 +150,8 @@ impl<'a> Judge<'a> {
                 all(Truth::True, parts.iter().map(|part| self.condition(part, scope, open)))
             }
             Condition::Not(inner) => {
-                let Judgement { value, word } = self.condition(inner, scope, open);
-                Judgement { value: value.not(), word }
+                let inner = self.condition(inner, scope, open);
+                Judgement { value: inner.value.not(), ..inner }
             }
             Condition::Forall(variables, inner) => self.each(Truth::False, variables, inner, scope, open),
             Condition::Exists(variables, inner) => self.each(Truth::True, variables, inner, scope, open),
@@ -237,7 +242,7 @@ impl<'a> Judge<'a> {
         }
         let objects: Option<Vec<ObjectId>> = arguments.iter().map(Held::object).collect();
         let holds = objects.is_some_and(|objects| self.state.holds(predicate, &objects));
-        let (value, is_seen) = match self.bounds(&declared.name) {
+        let (value, is_seen, sure) = match self.bounds(&declared.name) {
             Some(bounds) => {
                 let range = self.range(bounds, arguments);
                 let value = match range {
@@ -245,15 +250,15 @@ impl<'a> Judge<'a> {
                     Range { greatest, .. } if greatest <= 0.0 => Truth::False,
                     _ => Truth::Unknown,
                 };
-                (value, true)
+                (value, true, range.sure)
             }
-            None if holds => (Truth::True, false),
-            None if self.is_told_of_seen_alone(&declared.name, arguments) => (Truth::Unknown, true),
-            None if self.is_known(&declared.name, arguments) => (Truth::False, false),
-            None => (Truth::Unknown, false),
+            None if holds => (Truth::True, false, 1.0),
+            None if self.is_told_of_seen_alone(&declared.name, arguments) => (Truth::Unknown, true, 1.0),
+            None if self.is_known(&declared.name, arguments) => (Truth::False, false, 1.0),
+            None => (Truth::Unknown, false, 1.0),
         };
         let word = self.decisive(&declared.name, arguments, (false, is_seen, holds));
-        Judgement { value, word: Some(word) }
+        Judgement { value, word: Some(word), sure }
     }
 
     /// Judges a derived predicate: true if one of its rules holds.
@@ -323,7 +328,7 @@ impl<'a> Judge<'a> {
             (false, true) => Ordering::Greater,
             _ => Ordering::Equal,
         });
-        Judgement { value, word: words.into_iter().next() }
+        Judgement { value, word: words.into_iter().next(), sure: left.sure.min(right.sure) }
     }
 
     fn expression(&self, own: &Expression, scope: &[Bound<'a>], words: &mut Vec<Decisive>) -> Range {
@@ -486,10 +491,12 @@ pub(crate) fn is_own(domain: &Domain, word: &str) -> bool {
 /// tell is reported first.
 fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
     let mut left: Option<Judgement> = None;
+    let mut sure = 1.0_f64;
     for part in parts {
         if part.value == decides {
             return part;
         }
+        sure = sure.min(part.sure);
         let is_better = match &left {
             None => true,
             Some(left) if left.value == Truth::Unknown => part.is_open_to_looks() && !left.is_open_to_looks(),
@@ -497,5 +504,5 @@ fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
         };
         left = if is_better { Some(part) } else { left };
     }
-    left.unwrap_or(Judgement::of(decides.not()))
+    Judgement { sure, ..left.unwrap_or(Judgement::of(decides.not())) }
 }

@@ -13,6 +13,8 @@ pub struct Range {
     pub least: f64,
     /// Maximum value that further views may bring.
     pub greatest: f64,
+    /// Probability that the value lies in the range.
+    pub sure: f64,
 }
 
 /// Argument of a predicate or function.
@@ -31,14 +33,19 @@ pub type Bounds = fn(&Situation, &[Referent<'_>]) -> Range;
 
 impl Range {
     /// Range of an unknown probability.
-    pub const UNKNOWN: Range = Range { believed: 0.0, least: 0.0, greatest: 1.0 };
+    pub const UNKNOWN: Range = Range { believed: 0.0, least: 0.0, greatest: 1.0, sure: 1.0 };
     /// Range of an unknown number.
     pub const UNDEFINED: Range =
-        Range { believed: f64::NEG_INFINITY, least: f64::NEG_INFINITY, greatest: f64::INFINITY };
+        Range { believed: f64::NEG_INFINITY, least: f64::NEG_INFINITY, greatest: f64::INFINITY, sure: 1.0 };
 
     /// Range of a known value.
     pub const fn exactly(value: f64) -> Range {
-        Range { believed: value, least: value, greatest: value }
+        Range { believed: value, least: value, greatest: value, sure: 1.0 }
+    }
+
+    /// The same range with a probability that the value lies in it.
+    pub const fn with(self, sure: f64) -> Range {
+        Range { sure, ..self }
     }
 
     /// Range of a certainty that views may raise; its lower bound is fixed once the certainty reaches
@@ -46,15 +53,20 @@ impl Range {
     pub fn certainty(value: f64, wanted: f64) -> Range {
         // As the problem of a round states it.
         let value = (value * 1e6).round() / 1e6;
-        Range { believed: value, least: if value >= wanted { value } else { 0.0 }, greatest: 1.0 }
+        Range {
+            believed: value,
+            least: if value >= wanted { value } else { 0.0 },
+            greatest: 1.0,
+            sure: value,
+        }
     }
 
     /// Range of a predicate with a probability; settled if the probability, or its complement, reaches
     /// `wanted`.
     pub fn settled(probability: f64, wanted: f64) -> Range {
         match probability {
-            p if p >= wanted => Range::exactly(1.0),
-            p if p <= 1.0 - wanted => Range::exactly(0.0),
+            p if p >= wanted => Range::exactly(1.0).with(p),
+            p if p <= 1.0 - wanted => Range::exactly(0.0).with(1.0 - p),
             _ => Range::UNKNOWN,
         }
     }
@@ -78,6 +90,6 @@ impl Range {
         }
         let (least, greatest) =
             values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, g), &v| (l.min(v), g.max(v)));
-        Range { believed: least, least, greatest }
+        Range { believed: least, least, greatest, sure: self.sure.min(other.sure) }
     }
 }

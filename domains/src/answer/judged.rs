@@ -16,7 +16,7 @@ impl Asker<'_> {
     pub(super) fn judgement(&self) -> Judgement {
         let round = self.round;
         let judge = Judge::new(self.domain, &self.mind.words, self.s, &round.task, &round.attachments);
-        judge.map_or(Judgement { value: Truth::Unknown, word: None }, |judge| judge.goal())
+        judge.map_or(Judgement::UNKNOWN, |judge| judge.goal())
     }
 
     /// Sentence on why the truth of the goal cannot be told; `word` is the fact on which it depends.
@@ -178,7 +178,7 @@ impl Asker<'_> {
 
     /// Verdict and sentence for a question that further actions cannot settle better.
     pub(super) fn to_question(&self) -> (Verdict, String) {
-        let Judgement { value, word } = self.judgement();
+        let Judgement { value, word, .. } = self.judgement();
         match value {
             Truth::True => self.reached(),
             Truth::False => {

@@ -5,7 +5,6 @@ use descry_planner::{NoPlan, Plan};
 use super::{Choice, NOTHING_LEFT, World};
 use crate::abilities::searching::policies::{self, Look};
 use crate::ability::Deed;
-use crate::error::WorldError;
 use crate::judge::{Decisive, Judge, Judgement, Truth};
 use crate::looking::looks;
 use crate::round::Round;
@@ -15,19 +14,15 @@ use crate::{abilities, actions, culprit, origin, words};
 impl World<'_> {
     /// Choice after the planner has hit its state limit: a certainly useful step, or else a view behind
     /// a shut door.
-    ///
-    /// # Errors
-    ///
-    /// None at present.
-    pub fn fallback(&mut self, round: &Round) -> Result<Choice, WorldError> {
+    pub fn fallback(&mut self, round: &Round) -> Choice {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
         if self.is_beyond_looks(round) {
-            return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+            return Choice::Nothing(NOTHING_LEFT.into());
         }
         let all = self.own_fallback(s).unwrap_or_else(|| looks::look_deeds(s));
         match self.first_of(round, &all) {
-            Some(choice) => Ok(choice),
+            Some(choice) => choice,
             None => self.behind(round),
         }
     }
@@ -39,17 +34,17 @@ impl World<'_> {
     }
 
     /// Choice of a view behind a shut door; [`Choice::Nothing`] if there is none.
-    fn behind(&mut self, round: &Round) -> Result<Choice, WorldError> {
+    fn behind(&mut self, round: &Round) -> Choice {
         let s = &round.situation;
         loop {
             let barred = &self.barred;
             let is_barred = |look: &Look| barred.contains(&looks::look(s, look.from, look.on));
             let Some(look) = policies::behind(s, &is_barred).filter(|_| s.held.is_none()) else {
-                return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+                return Choice::Nothing(NOTHING_LEFT.into());
             };
             let deed = looks::look(s, look.from, look.on);
             if let Some(choice) = self.head_for(round, deed, look.from, false) {
-                return Ok(choice);
+                return choice;
             }
         }
     }
@@ -105,33 +100,25 @@ impl World<'_> {
     /// Choice of a view to take before accepting a goal that holds by absence of evidence: the one that
     /// settles most of the contrary evidence, or else one behind a shut door, while the answer is
     /// unknown.
-    ///
-    /// # Errors
-    ///
-    /// None at present.
-    pub fn before_denying(&mut self, round: &Round) -> Result<Choice, WorldError> {
+    pub fn before_denying(&mut self, round: &Round) -> Choice {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
         if let Some(choice) = self.reveals(round) {
-            return Ok(choice);
+            return choice;
         }
         if s.held.is_some() || !self.is_open_to_looks(round) {
-            return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+            return Choice::Nothing(NOTHING_LEFT.into());
         }
         let looks = looks::look_deeds(s).into_iter().chain(self.own_fallback(s).unwrap_or_default());
         match self.first_of(round, &looks.collect::<Vec<_>>()) {
-            Some(choice) => Ok(choice),
+            Some(choice) => choice,
             None => self.behind(round),
         }
     }
 
     /// Choice of a view that may still help without a plan, if time is too short or no view promises the
     /// goal: the one with the highest gain per second that ends in time.
-    ///
-    /// # Errors
-    ///
-    /// None at present.
-    pub fn in_time(&mut self, round: &Round) -> Result<Choice, WorldError> {
+    pub fn in_time(&mut self, round: &Round) -> Choice {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
         let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
@@ -142,6 +129,6 @@ impl World<'_> {
         let may_look = (is_late || is_asked) && s.held.is_none() && is_searching;
         let mut looks = if may_look { looks::look_deeds(s) } else { Vec::new() };
         looks.extend(self.own_fallback(s).filter(|_| is_asked && s.held.is_none()).unwrap_or_default());
-        Ok(self.first_of(round, &looks).unwrap_or_else(|| Choice::Nothing(NOTHING_LEFT.into())))
+        self.first_of(round, &looks).unwrap_or_else(|| Choice::Nothing(NOTHING_LEFT.into()))
     }
 }

@@ -16,12 +16,7 @@ use super::world::{Act, World};
 /// action runs (an envelope). All other actions can be compressed into one step.
 pub fn envelopes(world: &World) -> Vec<bool> {
     let wanted = Wanted::new(world);
-    world
-        .acts
-        .iter()
-        .enumerate()
-        .map(|(index, act)| act.durative && wanted.inside(index as u32, act))
-        .collect()
+    world.acts.iter().map(|act| act.durative && wanted.inside(act)).collect()
 }
 
 /// True, by action, if the action is durative: splitting all of them covers every interleaving.
@@ -181,7 +176,7 @@ impl Wanted {
         Wanted { facts, numbers: touched.numbers.iter().copied().collect(), read }
     }
 
-    fn inside(&self, _index: u32, act: &Act) -> bool {
+    fn inside(&self, act: &Act) -> bool {
         act.start_effects.iter().any(|effect| match &effect.outcome {
             GroundOutcome::Set(fact) => self.facts.contains(fact) && undone(*fact, act.end_effects),
             GroundOutcome::Change { fluent, change: Change::Increase, .. } => {

@@ -135,7 +135,7 @@ fn thing_of<'a>(s: &'a Situation, of: Option<&Referent<'_>>) -> Option<&'a Floor
 /// Bounds on an object's looseness, metres: further scans can only lessen it.
 fn looseness_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let now_m = thing_of(s, of.first()).map_or(NOTHING_KNOWN_M, FloorThing::looseness_m);
-    Range { believed: now_m, least: 0.0, greatest: now_m }
+    Range { believed: now_m, least: 0.0, greatest: now_m, sure: 1.0 }
 }
 
 /// Bounds on the certainty of what shape an object has.
@@ -157,7 +157,7 @@ fn found_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(shape)] = of else { return Range::UNKNOWN };
     let sure = Range::certainty(s.floor().surest(shape), s.threshold);
     let is_absent = sure.believed < s.threshold && s.floor().has_none(shape, s.threshold);
-    if is_absent { Range::exactly(0.0) } else { sure }
+    if is_absent { Range::exactly(0.0).with(s.threshold) } else { sure }
 }
 
 fn learned(s: &Situation) -> Vec<String> {

@@ -15,6 +15,7 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(what)] = of else { return Range::UNKNOWN };
     let Ok(what) = s.thing(what) else { return Range::UNKNOWN };
     let sure = Range::certainty(s.confidence(what), s.threshold);
-    let is_absent = sure.believed < s.threshold && s.chance_there(what) <= s.thresholds.not_there;
-    if is_absent { Range::exactly(0.0) } else { sure }
+    let chance = s.chance_there(what);
+    let is_absent = sure.believed < s.threshold && chance <= s.thresholds.not_there;
+    if is_absent { Range::exactly(0.0).with(1.0 - chance) } else { sure }
 }

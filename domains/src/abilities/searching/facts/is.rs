@@ -25,7 +25,9 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let of_track = |track: &Track| Range::settled(track.probability_of(&s.kinds[of].name), s.threshold);
     match what {
         Referent::Seen(track) => of_track(track),
-        Referent::Unseen if s.completeness(of) >= s.wanted_of(of) => Range::exactly(0.0),
+        Referent::Unseen if s.completeness(of) >= s.wanted_of(of) => {
+            Range::exactly(0.0).with(s.completeness(of))
+        }
         Referent::Unseen => Range::UNKNOWN,
         Referent::Named(what) => {
             let Ok(what) = s.thing(what) else { return Range::UNKNOWN };

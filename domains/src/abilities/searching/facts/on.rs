@@ -24,8 +24,8 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
         of => presence::bounds(s, of),
     };
     match there {
-        sure if sure.believed >= s.threshold => Range::exactly(1.0),
-        none if none.greatest <= 0.0 => Range::exactly(0.0),
+        sure if sure.believed >= s.threshold => Range::exactly(1.0).with(sure.sure),
+        none if none.greatest <= 0.0 => none,
         _ => Range::UNKNOWN,
     }
 }

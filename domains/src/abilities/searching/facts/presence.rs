@@ -26,13 +26,15 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
         },
         // On a surface that nobody has found, it stands where it may be at all.
         (Referent::Named(what), None) => match s.thing(what) {
-            Ok(what) if s.chance_there(what) <= s.thresholds.not_there => Range::exactly(0.0),
+            Ok(what) if s.chance_there(what) <= s.thresholds.not_there => {
+                Range::exactly(0.0).with(1.0 - s.chance_there(what))
+            }
             _ => Range::UNKNOWN,
         },
         (Referent::Seen(track), Some(on)) => {
             Range::exactly(f64::from(u8::from(track.on == s.surfaces[on].symbol)))
         }
-        (Referent::Unseen, Some(on)) if s.is_clear(on) => Range::exactly(0.0),
+        (Referent::Unseen, Some(on)) if s.is_clear(on) => Range::exactly(0.0).with(s.clarity(on)),
         _ => Range::UNKNOWN,
     }
 }
@@ -40,9 +42,12 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
 fn of_thing(s: &Situation, what: usize, on: usize) -> Range {
     let sure = Range::certainty(s.presence(what, on), s.threshold);
     let thing = &s.things[what];
-    let is_elsewhere = match thing.track {
-        Some(id) => s.on_surface(on).all(|track| track.id != id),
-        None => sure.believed < s.threshold && s.chance_on(what, on) <= s.thresholds.not_there,
-    };
-    if is_elsewhere { Range::exactly(0.0) } else { sure }
+    let chance = s.chance_on(what, on);
+    match thing.track {
+        Some(id) if s.on_surface(on).all(|track| track.id != id) => Range::exactly(0.0),
+        None if sure.believed < s.threshold && chance <= s.thresholds.not_there => {
+            Range::exactly(0.0).with(1.0 - chance)
+        }
+        _ => sure,
+    }
 }

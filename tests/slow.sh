@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Runs the tests that `cargo test` leaves out, one process each, and prints a table: seconds of processor time, outcome, name.
-#   tests/slow.sh            all of them
+#   tests/slow.sh            all but those that take hours
 #   tests/slow.sh slow       those that take long
 #   tests/slow.sh data       those that read published tasks and recordings in ../shared
+#   tests/slow.sh long       those that take hours: thousands of draws
 #   tests/slow.sh all WORD   those whose name holds a word
-# LIMIT_S, 600 if unset, ends a test that takes longer. Fails if one of them failed.
+# LIMIT_S, 600 if unset, ends a test that takes longer (those of `long` want more). Fails if one of them failed.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 kind=${1:-all} word=${2:-} failed=0 passed=0
@@ -24,7 +25,7 @@ while read -r source program; do
   while read -r name; do
     is=$(reason "$name" "$crate")
     [ "$is" = makes ] && continue
-    [ "$kind" = all ] || [ "$kind" = "$is" ] || continue
+    if [ "$kind" = all ]; then [ "$is" = long ] && continue; else [ "$kind" = "$is" ] || continue; fi
     case "$name" in *"$word"*) ;; *) continue ;; esac
     { time (cd "$crate" && exec timeout "${LIMIT_S:-600}" "$program" --ignored --exact "$name" >/tmp/descry-slow.$$.out 2>&1 </dev/null); } 2>/tmp/descry-slow.$$.time
     if [ $? -eq 0 ]; then outcome=ok passed=$((passed + 1)); else outcome=FAILED failed=$((failed + 1)); fi

@@ -164,13 +164,13 @@ fn a_domain_in_other_words_is_lived_with_alike() {
 }
 
 #[test]
-#[ignore = "slow: 50 seeds, five ways to choose, each twice"]
+#[ignore = "long: 50 seeds, five ways to choose, each twice"]
 fn fifty_runs_on_the_tabletop_are_alike_in_other_words() {
     check("tabletop", &TABLETOP, &WAYS, 1..51);
 }
 
 #[test]
-#[ignore = "slow: 50 seeds, five ways to choose, each twice"]
+#[ignore = "long: 50 seeds, five ways to choose, each twice"]
 fn fifty_runs_in_the_home_are_alike_in_other_words() {
     check("home", &HOME, &WAYS, 1..51);
 }

@@ -64,13 +64,13 @@ fn check_kills(robot: &str, exit: i32, after: impl Fn(&Path)) {
 }
 
 #[test]
-#[ignore = "slow: takes minutes: 200 kills"]
+#[ignore = "long: takes minutes: 200 kills"]
 fn two_hundred_kills_of_the_simulated_body() {
     check_kills("sim", 0, |_| ());
 }
 
 #[test]
-#[ignore = "slow: takes minutes: 200 kills"]
+#[ignore = "long: takes minutes: 200 kills"]
 fn two_hundred_kills_of_a_program() {
     if has_python() {
         check_kills("program:python3 body.py", 1, check_nothing_twice);

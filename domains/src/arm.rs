@@ -27,10 +27,9 @@ impl Situation {
     pub fn standing(&self, thing: &str, surface: &str) -> Option<&Track> {
         let thing = &self.things[self.thing(thing).ok()?];
         let there = self.belief.tracks.iter().filter(|t| t.on == surface);
-        let p = |t: &Track| {
-            if thing.track.is_none_or(|id| id == t.id) { t.probability_of(&thing.name) } else { 0.0 }
-        };
-        there.max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) >= self.threshold)
+        there
+            .max_by(|a, b| thing.is(a).total_cmp(&thing.is(b)))
+            .filter(|track| thing.is(track) >= self.threshold)
     }
 
     /// Point of an object's axis at a share of its height above its foot, map frame.

@@ -286,6 +286,9 @@ impl<'t> Visit<'t> {
         let anywhere = rooms.is_empty() && of_type("surface").any(is_variable);
         let (things, kinds, named, asked_rooms) = (of("thing"), of("kind"), of("surface"), of("room"));
         let is_of_all = OF_OBJECTS.contains(&word.name.as_str()) && of_type("thing").any(is_variable);
+        if is_denied && is_of_all {
+            self.asked.clears.extend(of_type("surface").map(text));
+        }
         let surfaces: Vec<String> = named.iter().cloned().chain(rooms).collect();
         if word.name == PLACED {
             self.placed.extend(things);

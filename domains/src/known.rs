@@ -37,11 +37,30 @@ pub struct Thing {
 }
 
 impl Thing {
+    /// A seen object itself, whatever it is.
+    pub fn seen(track: &Track) -> Self {
+        let name = track.label().or_else(|| track.kind()).unwrap_or("unknown object").to_string();
+        Self {
+            symbol: format!("{}-{}", symbol(&name), track.id),
+            name,
+            track: Some(track.id),
+            ..Self::default()
+        }
+    }
+
+    /// Probability that a seen object is the target, wherever it stands.
+    pub fn is(&self, track: &Track) -> f64 {
+        match self.track {
+            Some(id) if id != track.id => 0.0,
+            Some(_) if self.models.is_empty() => 1.0,
+            _ => track.probability_of(&self.name),
+        }
+    }
+
     /// Probability that a seen object is the target, within the requested places.
     pub fn probability(&self, track: &Track, surfaces: &[KnownSurface]) -> f64 {
-        let meant = self.track.is_none_or(|id| id == track.id);
         let asked = self.on.as_ref().is_none_or(|on| on.iter().any(|&n| surfaces[n].symbol == track.on));
-        if meant && asked { track.probability_of(&self.name) } else { 0.0 }
+        if asked { self.is(track) } else { 0.0 }
     }
 
     /// True if the target may be on a surface (index), given the requested places; false for a seen
@@ -126,6 +145,21 @@ pub struct Known {
 }
 
 impl Known {
+    /// True if a seen object is taken for the thing: by identity if the thing is a seen object, else by
+    /// probability.
+    pub(crate) fn is_taken_for(&self, thing: &Thing, track: &Track) -> bool {
+        match thing.track {
+            Some(id) => id == track.id,
+            None => track.probability_of(&thing.name) >= self.threshold,
+        }
+    }
+
+    /// Seen objects that are none of the problem's things.
+    pub(crate) fn strangers(&self) -> impl Iterator<Item = &Track> {
+        let is_thing = |track: &Track| self.things.iter().any(|thing| self.is_taken_for(thing, track));
+        self.belief.tracks.iter().filter(move |track| !is_thing(track))
+    }
+
     /// Restarts the time at the pose and resets the localisation error, after the body has moved.
     pub fn has_moved(&mut self) {
         (self.stands_since_ns, self.errs_by) = (self.robot.now_ns(), None);

@@ -55,6 +55,8 @@ pub struct Asked {
     /// True if the condition wants a fact about seen objects to be false, or a certainty to be
     /// small.
     pub denies: bool,
+    /// Surfaces that the condition wants every thing off; [`VARIABLE`]: any.
+    pub clears: Vec<String>,
     /// True if the condition has a fact that looking cannot establish.
     pub more: bool,
     /// True if the condition is a single predicate that must hold, or a single function that must reach

@@ -13,6 +13,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::Instant;
 
 use descry_memory::Record;
+use descry_memory::belief::Track;
 use descry_perception::recognise::Recogniser;
 use descry_planner::{Attachments, Plan, Source, Task};
 use descry_robots::{PoseEstimate, Robot};
@@ -32,7 +33,7 @@ use crate::lexicon::{Lexicon, Places};
 use crate::load::Domain;
 use crate::looking::{candidates, looks};
 use crate::mind::Mind;
-use crate::objective::Goal;
+use crate::objective::{Goal, VARIABLE};
 use crate::origin::{self, Origin};
 use crate::own_map::NoMap;
 use crate::past::Past;
@@ -219,6 +220,16 @@ impl<'a> World<'a> {
         let members =
             if domain.vocabulary.word("is").is_some() { members(&self.mind.known) } else { Vec::new() };
         self.mind.known.things = self.asked.iter().cloned().chain(members).collect();
+        if !goal.question {
+            let known = &self.mind.known;
+            let is_cleared =
+                |on: &str| goal.asked.clears.iter().any(|place| place == on || place == VARIABLE);
+            let is_held = |track: &Track| known.held.as_ref().is_some_and(|held| held.track == track.id);
+            let is_in_the_way = |track: &&Track| is_cleared(&track.on) || is_held(track);
+            let seen = known.strangers().filter(is_in_the_way).map(Thing::seen);
+            let seen: Vec<Thing> = seen.filter(|_| !goal.asked.clears.is_empty()).collect();
+            self.mind.known.things.extend(seen);
+        }
         self.mind.known.expected = expected(domain, &self.mind.known);
         self.mind.known.surfaces.iter().for_each(|surface| self.lexicon.learn("surface", &surface.name));
         let names = abilities::ALL.iter().filter_map(|ability| ability.names);

@@ -39,6 +39,15 @@ impl Speech {
         goal::read(said, &self.domain, &self.lexicon)
     }
 
+    /// A goal with a name in each slot that is left open.
+    fn filled(&self, offer: &str) -> String {
+        let word = |word: &str| match word.strip_prefix('<').and_then(|word| word.strip_suffix('>')) {
+            Some(of) => self.lexicon.of_type(of)[0].names[0].clone(),
+            None => word.to_string(),
+        };
+        offer.split(' ').map(word).collect::<Vec<_>>().join(" ")
+    }
+
     /// The fault in how a sentence is understood, if any.
     fn fault(&self, said: &Said) -> Option<String> {
         let found = self.read(&said.say).map_err(|e| e.to_string());
@@ -60,7 +69,7 @@ impl Speech {
             .filter(|l| l.contains("did you mean"))
             .flat_map(|l| l.split('"').skip(1).step_by(2))
             .collect();
-        if let Some(unknown) = offered.iter().find(|offer| self.read(offer).is_err()) {
+        if let Some(unknown) = offered.iter().find(|offer| self.read(&self.filled(offer)).is_err()) {
             return Some(format!("\"{unknown}\" is offered and not understood\n{why}"));
         }
         let is_offered = said.offers.as_ref().is_none_or(|offer| offered.contains(&offer.as_str()));

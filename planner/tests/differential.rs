@@ -254,7 +254,7 @@ fn random_tasks_mean_the_same_to_all() {
 }
 
 #[test]
-#[ignore = "slow: a hundred thousand tasks: minutes"]
+#[ignore = "long: a hundred thousand tasks: minutes"]
 fn a_hundred_thousand_random_tasks_mean_the_same_to_all() {
     compare_all(1_000..101_000, &ALL);
 }
@@ -272,7 +272,7 @@ fn random_tasks_with_times_and_numbers_that_flow_mean_the_same_to_all() {
 }
 
 #[test]
-#[ignore = "slow: tens of thousands of tasks: minutes"]
+#[ignore = "long: tens of thousands of tasks: minutes"]
 fn many_random_tasks_with_times_and_numbers_that_flow_mean_the_same_to_all() {
     let tally = compare_all(seeds(1_000..21_000), &[Kind::Mixed]);
     assert!(3 * tally.solved > tally.tasks, "{tally:?}");
@@ -287,7 +287,7 @@ fn seeds(range: std::ops::Range<u64>) -> std::ops::Range<u64> {
 }
 
 #[test]
-#[ignore = "slow: ten thousand tasks: minutes"]
+#[ignore = "long: ten thousand tasks: minutes"]
 fn ten_thousand_random_tasks_with_timed_literals_mean_the_same_to_all() {
     let tally = compare_all(1_000..11_000, &[Kind::Given]);
     assert!(3 * tally.solved > tally.tasks, "{tally:?}");

@@ -236,7 +236,7 @@ fn random_tasks_are_planned_for_as_all_short_plans_say() {
 }
 
 #[test]
-#[ignore = "slow: twenty thousand tasks: minutes"]
+#[ignore = "long: twenty thousand tasks: minutes"]
 fn many_random_tasks_are_planned_for_as_all_short_plans_say() {
     println!("{:?}", brute::compare_all(1_000..21_000));
 }

@@ -3,7 +3,6 @@
 use descry_memory::belief::Track;
 
 use crate::belief::{adrift, doubt};
-use crate::known::Thing;
 use crate::situation::Situation;
 
 impl Situation {
@@ -34,10 +33,7 @@ impl Situation {
     /// Probability that a thing stands on a surface, 0 to 1.
     pub fn presence(&self, what: usize, on: usize) -> f64 {
         let thing = &self.things[what];
-        self.on_surface(on)
-            .filter(|t| thing.track.is_none_or(|id| id == t.id))
-            .map(|t| t.probability_of(&thing.name) * self.trust(t))
-            .fold(0.0, f64::max)
+        self.on_surface(on).map(|track| thing.is(track) * self.trust(track)).fold(0.0, f64::max)
     }
 
     /// Probability that camera and poses of the views by which an object is known have no fault.
@@ -116,20 +112,5 @@ impl Situation {
     /// True if a view of a surface was taken in this run.
     pub(crate) fn is_looked_at(&self, on: usize) -> bool {
         !self.spaces[on].seen_from().is_empty()
-    }
-
-    /// True if a seen object is taken for the thing: by identity if the thing is a seen object, else by
-    /// probability.
-    pub(crate) fn is_taken_for(&self, thing: &Thing, track: &Track) -> bool {
-        match thing.track {
-            Some(id) => id == track.id,
-            None => track.probability_of(&thing.name) >= self.threshold,
-        }
-    }
-
-    /// Seen objects that are none of the problem's things.
-    pub(crate) fn strangers(&self) -> impl Iterator<Item = &Track> {
-        let is_thing = |track: &Track| self.things.iter().any(|thing| self.is_taken_for(thing, track));
-        self.belief.tracks.iter().filter(move |track| !is_thing(track))
     }
 }

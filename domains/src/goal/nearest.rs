@@ -1,4 +1,4 @@
-//! Suggestions for unmatched words: the domain's nearest phrases, with the given names.
+//! Suggestions for unmatched words: the domain's nearest phrases, with the given names; other slots stay open.
 
 use std::ops::Range;
 
@@ -12,9 +12,8 @@ use crate::slots::type_of_slot;
 const SHOWN: usize = 2;
 /// Number of leading words considered in a long sentence.
 const HEARD: usize = 24;
-/// Score penalty of a suggested name that was not given. From: fitted,
-/// `domains/tests/phrases.toml`.
-const MADE_UP: f64 = 0.8;
+/// Score penalty of a slot that no given name fills. From: fitted, `domains/tests/phrases.toml`.
+const UNFILLED: f64 = 0.8;
 /// Maximum share of differing letters in a mistyped word.
 const MISTYPED: f64 = 0.34;
 
@@ -58,11 +57,11 @@ pub(super) fn nearest(words: &[String], domain: &Domain, lexicon: &Lexicon) -> N
     let mentions: Vec<Mention> = whole.chain(self::mentions(words, domain, lexicon, false)).collect();
     let mut all: Vec<Candidate> = Vec::new();
     for phrase in &domain.config.goal {
-        let ways = phrase.ways().filter_map(|say| candidate(say, words, &mentions, lexicon));
+        let ways = phrase.ways().map(|say| candidate(say, words, &mentions));
         // Other wordings of one phrase are no further suggestions.
         let best = ways.reduce(|a, b| if b.score > a.score { b } else { a });
-        let usual = candidate(&phrase.say, words, &mentions, lexicon);
-        let best = best.zip(usual).map(|(best, usual)| Candidate { text: usual.text, ..best });
+        let text = candidate(&phrase.say, words, &mentions).text;
+        let best = best.map(|best| Candidate { text, ..best });
         all.extend(best.filter(|c| all.iter().all(|known| known.text != c.text)));
     }
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -138,7 +137,7 @@ fn likeness(wanted: &str, words: &[String], used: &[bool]) -> Option<(usize, f64
     free.filter(|(_, like)| *like > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a })
 }
 
-fn candidate(say: &str, words: &[String], mentions: &[Mention], lexicon: &Lexicon) -> Option<Candidate> {
+fn candidate(say: &str, words: &[String], mentions: &[Mention]) -> Candidate {
     let own: Vec<String> = pattern(say).iter().map(|word| word.to_lowercase()).collect();
     let mut used = vec![false; words.len()];
     let (mut score, mut text) = (0.0, Vec::new());
@@ -154,12 +153,9 @@ fn candidate(say: &str, words: &[String], mentions: &[Mention], lexicon: &Lexico
                 names.push(mention.name.clone());
             }
             None => {
-                score -= MADE_UP;
+                score -= UNFILLED;
                 is_named = false;
-                let is_left = |name: &&String| mentions.iter().any(|m| m.is_left && m.name == **name);
-                let usual = lexicon.of_type(&of).iter().map(|named| &named.names[0]);
-                let usual = usual.filter(|name| !is_left(name));
-                names.push(usual.min_by_key(|name| name.len())?.clone());
+                names.push(format!("<{of}>"));
             }
         }
     }
@@ -188,5 +184,5 @@ fn candidate(say: &str, words: &[String], mentions: &[Mention], lexicon: &Lexico
         .map(|(w, _)| w.clone())
         .collect();
     score -= 0.25 * left.len() as f64;
-    Some(Candidate { text: text.join(" "), left, is_named, score })
+    Candidate { text: text.join(" "), left, is_named, score }
 }

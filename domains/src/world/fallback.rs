@@ -1,5 +1,6 @@
 //! Fallback steps when the planner has no plan.
 
+use descry_planner::task::{Condition, Scoped};
 use descry_planner::{NoPlan, Plan};
 
 use super::{Choice, NOTHING_LEFT, World};
@@ -106,14 +107,37 @@ impl World<'_> {
         if let Some(choice) = self.reveals(round) {
             return choice;
         }
-        if s.held.is_some() || !self.is_open_to_looks(round) {
+        if !self.is_open_to_looks(round) {
             return Choice::Nothing(NOTHING_LEFT.into());
+        }
+        if s.held.is_some() {
+            return self.with_free_hand(round);
         }
         let looks = looks::look_deeds(s).into_iter().chain(self.own_fallback(s).unwrap_or_default());
         match self.first_of(round, &looks.collect::<Vec<_>>()) {
             Some(choice) => choice,
             None => self.behind(round),
         }
+    }
+
+    /// Choice of a view while something is in the hand: by a plan that keeps the goal true, and so
+    /// puts the object down where the goal allows it.
+    fn with_free_hand(&mut self, round: &Round) -> Choice {
+        let looks = looks::look_deeds(&round.situation);
+        let mut open = looks.into_iter().filter_map(|mut deeds| deeds.pop());
+        while let Some(deed) = open.by_ref().find(|deed| !self.barred.contains(deed)) {
+            if let Some(Choice::Towards { mut task, then }) =
+                self.towards(round, std::slice::from_ref(&deed), false)
+            {
+                let goal = &round.task.goal;
+                let body = Condition::And(vec![task.goal.body, goal.body.clone()]);
+                task.goal = Scoped { slots: task.goal.slots.max(goal.slots), body };
+                self.heading_for = Some(deed);
+                return Choice::Towards { task, then };
+            }
+            self.barred.extend([deed]);
+        }
+        Choice::Nothing(NOTHING_LEFT.into())
     }
 
     /// Choice of a view that may still help without a plan, if time is too short or no view promises the

@@ -3,7 +3,7 @@
 
 use descry_planner::semantics::Binding;
 use descry_planner::task::{Action, Comparison, Condition, Quantified, Scoped, Slot, When};
-use descry_planner::{Plan, Semantics, Step, Task, after};
+use descry_planner::{Plan, Semantics, Step, Task, after, monitor};
 
 use super::{Choice, World};
 use crate::abilities;
@@ -39,9 +39,15 @@ impl World<'_> {
         choice
     }
 
-    /// First of several alternatives that can be carried out at once; `None` if none can.
+    /// First of several alternatives that can be carried out at once, if possible one that leaves true
+    /// what holds of the goal; `None` if none can be carried out.
     pub(super) fn first_of(&self, round: &Round, all: &[Vec<Deed>]) -> Option<Choice> {
-        all.iter().find_map(|deeds| self.directly(round, deeds, false)).map(Choice::Steps)
+        let kept = reached(round);
+        let keeps = |plan: &Plan| monitor(&kept, &round.attachments, plan).is_ok();
+        let mut plans = all.iter().filter_map(|deeds| self.directly(round, deeds, false));
+        let first = plans.next()?;
+        let plan = if keeps(&first) { first } else { plans.find(keeps).unwrap_or(first) };
+        Some(Choice::Steps(plan))
     }
 
     /// Plan of consecutive steps that carry out the skills by the domain's actions, where their
@@ -132,6 +138,22 @@ impl World<'_> {
         }
         freed
     }
+}
+
+/// Task whose goal is what holds already of a round's goal.
+fn reached(round: &Round) -> Task {
+    let mut task = round.task.clone();
+    let parts = match std::mem::replace(&mut task.goal.body, Condition::TRUE) {
+        Condition::And(parts) => parts,
+        whole => vec![whole],
+    };
+    let semantics = Semantics::new(&round.task, &round.attachments);
+    let Ok(state) = semantics.initial() else { return task };
+    let holds = |part: &Condition| {
+        semantics.holds(&state, part, &mut Binding::new(round.task.goal.slots)).unwrap_or(false)
+    };
+    task.goal.body = Condition::And(parts.into_iter().filter(holds).collect());
+    task
 }
 
 /// Condition without the calls of some modules.

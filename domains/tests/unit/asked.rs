@@ -23,6 +23,7 @@ fn what_is_asked_is_read_off_the_condition() {
             kinds: own(kinds).into_iter().map(|kind| (kind, None)).collect(),
             surfaces: own(surfaces),
             denies: false,
+            clears: Vec::new(),
             more: condition.contains("observed"),
             plain: condition.matches('(').count() < 3,
             words: Vec::new(),
@@ -101,6 +102,21 @@ fn what_must_not_be_so_is_told_from_what_must() {
     // What is remembered of what was done is known.
     check("(not (slippery cup-a))", false, anywhere, &[]);
     check("(not (observed desk-1 desk))", false, &[], &[]);
+}
+
+#[test]
+fn a_place_that_is_to_be_cleared_is_told_from_one_that_a_thing_is_to_leave() {
+    let domain = Domain::load("home").unwrap();
+    let check = |condition: &str, clears: &[&str]| {
+        assert_eq!(asked(&domain, condition).clears, clears, "{condition}");
+    };
+    check("(forall (?t - thing) (not (on ?t desk)))", &["desk"]);
+    check("(and (>= (clarity desk) 0.8) (not (exists (?t - thing) (on ?t desk))))", &["desk"]);
+    check("(not (exists (?t - thing) (and (is ?t mug) (on ?t desk))))", &["desk"]);
+    check("(forall (?t - thing ?s - surface) (not (on ?t ?s)))", &["?"]);
+    check("(not (on cup-a desk))", &[]);
+    check("(forall (?t - thing) (imply (is ?t cup) (on ?t desk)))", &[]);
+    check("(exists (?t - thing) (on ?t desk))", &[]);
 }
 
 #[test]

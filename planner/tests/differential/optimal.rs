@@ -82,7 +82,7 @@ fn random_tasks_are_planned_optimally() {
 }
 
 #[test]
-#[ignore = "slow: thirty thousand tasks: minutes"]
+#[ignore = "long: thirty thousand tasks: minutes"]
 fn thirty_thousand_random_tasks_are_planned_optimally() {
     let tally = check_all(1_000..31_000);
     assert!(3 * tally.optimal > 30_000, "{tally:?}");

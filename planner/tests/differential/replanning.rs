@@ -99,7 +99,7 @@ fn random_problems_are_planned_for_again_as_anew() {
 }
 
 #[test]
-#[ignore = "slow: ten thousand tasks: minutes"]
+#[ignore = "long: ten thousand tasks: minutes"]
 fn ten_thousand_random_problems_are_planned_for_again_as_anew() {
     let mut tally = Tally::default();
     super::seeds(1_000..11_000).for_each(|seed| check(seed, &mut tally));

@@ -104,7 +104,7 @@ fn is_filled(s: &Situation, of: &[Referent<'_>]) -> Range {
 /// Bounds on `(level ?thing)`, litres.
 fn litres(s: &Situation, of: &[Referent<'_>]) -> Range {
     match content(s, of) {
-        Litres { least, most: Some(most) } => Range { believed: least, least, greatest: most },
+        Litres { least, most: Some(most) } => Range { believed: least, least, greatest: most, sure: 1.0 },
         Litres { least, most: None } => Range { least, ..Range::UNDEFINED },
     }
 }

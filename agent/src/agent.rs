@@ -15,7 +15,7 @@ use descry_domains::saying::Saying;
 use descry_domains::world::{Choice, Job, Setting, World};
 use descry_memory::{Blob, Draft, LogLevel, Meta, Record, RecordId, viewer};
 use descry_planner::{Outcome as Planned, Plan, Statistics, Step, Task};
-use descry_robots::Robot;
+use descry_robots::{Robot, Watch};
 use descry_skills::{Call, Context, SkillFailure};
 
 use crate::exit::CommandError;
@@ -235,7 +235,12 @@ impl<'a> Agent<'a> {
                 }
                 Choice::Towards { task, then } => match self.plan(world, &task, round)? {
                     Planned::Solved { plan, statistics } => {
-                        self.adopt(round, one_then(plan, then), &statistics, reason)?;
+                        let plan = one_then(plan, then);
+                        if ends_late(&plan, round.situation.time_left_s) {
+                            world.bar();
+                            continue;
+                        }
+                        self.adopt(round, plan, &statistics, reason)?;
                         return Ok(Taken::Up);
                     }
                     _ => world.bar(),
@@ -368,6 +373,7 @@ impl<'a> Agent<'a> {
             tracing::info!(%call, "begins");
             self.say(&Event::Acting { call: call.clone(), because })?;
         }
+        let begun_ns = self.robot.now_ns();
         let performed = match carried.as_slice() {
             [only] => vec![self.perform(world, &only.call).await?],
             several => self.perform_together(world, several).await?,
@@ -380,12 +386,33 @@ impl<'a> Agent<'a> {
                 Err(failure) => failed.push((carried.call, part, failure)),
             }
         }
+        self.wait_for_programs(world, &done, begun_ns).await?;
         let unmet = world.done(round, &done)?;
         failed.extend(unmet.into_iter().map(|(call, failure)| (call, usize::MAX, failure)));
         for (call, part, failure) in &failed {
             self.learn_from_failure(world, round, call, *part, failure).await?;
         }
         Ok(())
+    }
+
+    /// Lets the planned time of completed steps that programs carried out pass on the body's clock, which
+    /// may stand still meanwhile; the steps began at `begun_ns`.
+    async fn wait_for_programs(
+        &self,
+        world: &World<'_>,
+        done: &[Carried],
+        begun_ns: i64,
+    ) -> Result<(), CommandError> {
+        let by_program = done.iter().filter(|carried| world.is_by_program(&carried.call));
+        let ends_s = by_program.map(|c| c.step.start_s.unwrap_or(0.0) + c.step.duration_s);
+        let passed_s = (self.robot.now_ns() - begun_ns) as f64 * 1e-9;
+        let Some(left_s) = ends_s.reduce(f64::max).map(|s| s - passed_s).filter(|s| *s > 0.0) else {
+            return Ok(());
+        };
+        let watch = Watch { cancel: self.stop.token().clone(), ..Watch::default() };
+        let waited = self.robot.wait(left_s, &watch).await;
+        self.check_stopped()?;
+        waited.map_err(CommandError::broken)
     }
 
     /// Executes the parts of a call in order, and updates the world model from each outcome.

@@ -55,6 +55,7 @@ recipes! {
     tea 9
     benches 10
     pour 11
+    dust 12
 }
 
 #[test]

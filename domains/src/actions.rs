@@ -85,9 +85,14 @@ pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grou
 /// Effect of an action on the world: as declared for its program, else the strongest of its skills.
 /// Unless known otherwise, an action is changing.
 pub fn kind(config: &Config, action: &str) -> ActionKind {
+    stated_kind(config, action).unwrap_or(ActionKind::Changing)
+}
+
+/// Effect of an action on the world; `None` for an action of a program whose kind is not declared.
+pub(crate) fn stated_kind(config: &Config, action: &str) -> Option<ActionKind> {
     let own = config.action.get(action);
     if let Some(own) = own.filter(|own| own.program.is_some()) {
-        return own.kind.unwrap_or(ActionKind::Changing);
+        return own.kind;
     }
     let texts = own.map(|own| own.does.texts()).filter(|texts| !texts.is_empty());
     let skills = texts.unwrap_or_else(|| vec![action]);
@@ -95,7 +100,7 @@ pub fn kind(config: &Config, action: &str) -> ActionKind {
         let skill = text.split_whitespace().next().and_then(|name| abilities::skill(&config.uses, name));
         skill.map_or(ActionKind::Changing, |skill| skill.kind)
     };
-    skills.into_iter().map(kind).max().unwrap_or(ActionKind::Changing)
+    skills.into_iter().map(kind).max()
 }
 
 /// Action of the domain that carries out a deed, with the arguments that the deed determines.

@@ -17,7 +17,7 @@ use crate::belief::doubt::Doubt;
 use crate::conclusion::{Believed, Conclusion, Ended, Verdict};
 use crate::contradiction::Contradiction;
 use crate::english::{one, percent, plural, the};
-use crate::judge::{Judgement, Truth};
+use crate::judge::Truth;
 use crate::known::{Thing, is_alike};
 use crate::lexicon::Lexicon;
 use crate::load::Domain;
@@ -110,13 +110,14 @@ impl Asker<'_> {
         if let Some(unknown) = self.nowhere() {
             return (Verdict::CannotTell, unknown);
         }
-        let Judgement { value, word, .. } = self.judgement();
-        match value {
+        let judged = self.judgement();
+        let word = judged.word();
+        match judged.value {
             Truth::True => {}
-            Truth::Unknown => return (Verdict::CannotTell, self.open(word.as_ref())),
-            Truth::False if self.goal.question => return (Verdict::NotFound, self.denial(word.as_ref())),
+            Truth::Unknown => return (Verdict::CannotTell, self.open(word)),
+            Truth::False if self.goal.question => return (Verdict::NotFound, self.denial(word)),
             Truth::False => {
-                return (Verdict::Impossible, self.impossible(&format!(": {}", self.denial(word.as_ref()))));
+                return (Verdict::Impossible, self.impossible(&format!(": {}", self.denial(word))));
             }
         }
         let mut said = self.surely();
@@ -154,7 +155,7 @@ impl Asker<'_> {
             said.push(self.identified(on));
         }
         if said.is_empty() || self.goal.asked.more || self.goal.asked.denies {
-            let source = word.filter(|word| !word.is_seen).map_or("", |word| self.source(&word));
+            let source = word.filter(|word| !word.is_seen).map_or("", |word| self.source(word));
             said.insert(0, format!("it holds that {}{source}", self.saying.say(&self.goal.pddl)));
         }
         (Verdict::Achieved, said.join("; "))
@@ -242,7 +243,8 @@ impl Asker<'_> {
         if (is_beyond_looks || is_beyond_the_body) && is_proven {
             return (Verdict::Impossible, self.impossible(&says));
         }
-        let Judgement { value, word, .. } = self.judgement();
+        let judged = self.judgement();
+        let (value, word) = (judged.value, judged.word());
         if value == Truth::True {
             return self.reached();
         }
@@ -256,7 +258,7 @@ impl Asker<'_> {
         };
         let is_settled = self.goal.asked.denies || open.as_ref().is_some_and(|(n, _)| is_sound(*n));
         if self.goal.question && value == Truth::False && is_settled {
-            return (Verdict::NotFound, self.denial(word.as_ref()));
+            return (Verdict::NotFound, self.denial(word));
         }
         if let Some((n, doubt)) = open {
             let asked = self.where_asked(&s.things[n]);

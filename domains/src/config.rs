@@ -152,8 +152,8 @@ pub struct ActionConfig {
     pub does: Steps,
     /// Program that carries the action out, instead of a skill.
     pub program: Option<Vec<String>>,
-    /// Effect of that program on the world: `sensing`, `moving` or `changing`; if left out, `changing`.
-    /// A question uses no changing action.
+    /// Effect of that program on the world: `sensing`, `moving` or `changing`; if left out, `changing`,
+    /// and what it sets and a program states is unknown. A question uses no changing action.
     pub kind: Option<ActionKind>,
     /// Time limit of each skill on the body's clock, or of the program, seconds; 60 if left out.
     pub limit_s: Option<f64>,

@@ -299,3 +299,8 @@ pub fn plural(name: &str) -> String {
         None => format!("{name}s"),
     }
 }
+
+/// Number of times in words: "once", "3 times".
+pub(crate) fn times(count: usize) -> String {
+    if count == 1 { "once".into() } else { format!("{count} times") }
+}

@@ -6,8 +6,6 @@
 //! moving set it, where `init` mentions it, and where an action or a failure of this run has set it.
 //! Quantifiers also range over an object that nobody has seen.
 
-use std::cmp::Ordering;
-
 use descry_planner::semantics::Binding;
 use descry_planner::state::State;
 use descry_planner::task::{
@@ -49,13 +47,14 @@ impl Truth {
     }
 }
 
-/// Truth of a condition, with the fact that decides it or leaves it open.
+/// Truth of a condition, with the facts that decide it or leave it open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
     /// Truth value.
     pub value: Truth,
-    /// Deciding fact; `None` for a condition without facts.
-    pub word: Option<Decisive>,
+    /// Deciding fact, or all facts that leave the condition open, those that views can tell first; empty
+    /// for a condition without facts.
+    pub words: Vec<Decisive>,
     /// Probability that the truth value is right: the least of those of the facts that it rests on.
     pub sure: f64,
 }
@@ -85,15 +84,20 @@ impl Decisive {
 
 impl Judgement {
     /// Judgement of a condition that cannot be evaluated.
-    pub const UNKNOWN: Judgement = Judgement { value: Truth::Unknown, word: None, sure: 1.0 };
+    pub const UNKNOWN: Judgement = Judgement { value: Truth::Unknown, words: Vec::new(), sure: 1.0 };
 
     fn of(value: Truth) -> Judgement {
-        Judgement { value, word: None, sure: 1.0 }
+        Judgement { value, words: Vec::new(), sure: 1.0 }
+    }
+
+    /// First of the facts that decide the condition or leave it open; `None` for a condition without facts.
+    pub fn word(&self) -> Option<&Decisive> {
+        self.words.first()
     }
 
     /// True if the condition is open and views may decide it.
     pub fn is_open_to_looks(&self) -> bool {
-        self.value == Truth::Unknown && self.word.as_ref().is_some_and(|word| word.is_seen)
+        self.value == Truth::Unknown && self.word().is_some_and(|word| word.is_seen)
     }
 }
 
@@ -258,7 +262,7 @@ impl<'a> Judge<'a> {
             None => (Truth::Unknown, false, 1.0),
         };
         let word = self.decisive(&declared.name, arguments, (false, is_seen, holds));
-        Judgement { value, word: Some(word), sure }
+        Judgement { value, words: vec![word], sure }
     }
 
     /// Judges a derived predicate: true if one of its rules holds.
@@ -320,15 +324,15 @@ impl<'a> Judge<'a> {
             Comparison::Equal if left.greatest < right.least || left.least > right.greatest => Truth::False,
             _ => Truth::Unknown,
         };
-        // A number that has no value is the reason before what looks tell.
-        words.sort_by(|a: &Decisive, b: &Decisive| match (a.is_seen, b.is_seen) {
-            (false, true) if !a.holds => Ordering::Less,
-            (true, false) if !b.holds => Ordering::Greater,
-            (true, false) => Ordering::Less,
-            (false, true) => Ordering::Greater,
-            _ => Ordering::Equal,
-        });
-        Judgement { value, word: words.into_iter().next(), sure: left.sure.min(right.sure) }
+        // Numbers without a value are the reason before what looks tell.
+        let lacks = |word: &Decisive| !word.is_seen && !word.holds;
+        if words.iter().any(lacks) {
+            words.retain(lacks);
+        } else {
+            words.sort_by_key(|word| !word.is_seen);
+            words.truncate(1);
+        }
+        Judgement { value, words, sure: left.sure.min(right.sure) }
     }
 
     fn expression(&self, own: &Expression, scope: &[Bound<'a>], words: &mut Vec<Decisive>) -> Range {
@@ -487,8 +491,8 @@ pub(crate) fn is_own(domain: &Domain, word: &str) -> bool {
     changers.into_iter().all(|action| actions::kind(&domain.config, action) < ActionKind::Changing)
 }
 
-/// Judges several parts; one with the value `decides` suffices. Among open parts, one that views can
-/// tell is reported first.
+/// Judges several parts; one with the value `decides` suffices. Facts that views can tell come first
+/// among those of the open parts.
 fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
     let mut left: Option<Judgement> = None;
     let mut sure = 1.0_f64;
@@ -497,12 +501,14 @@ fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
             return part;
         }
         sure = sure.min(part.sure);
-        let is_better = match &left {
-            None => true,
-            Some(left) if left.value == Truth::Unknown => part.is_open_to_looks() && !left.is_open_to_looks(),
-            Some(_) => part.value == Truth::Unknown,
-        };
-        left = if is_better { Some(part) } else { left };
+        let is_open = part.value == Truth::Unknown;
+        match &mut left {
+            Some(left) if is_open && left.value == Truth::Unknown => left.words.extend(part.words),
+            Some(_) if !is_open => {}
+            _ => left = Some(part),
+        }
     }
-    Judgement { sure, ..left.unwrap_or(Judgement::of(decides.not())) }
+    let mut judged = left.unwrap_or(Judgement::of(decides.not()));
+    judged.words.sort_by_key(|word| !word.is_seen);
+    Judgement { sure, ..judged }
 }

@@ -192,7 +192,8 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
     let (pddl_name, pddl) = file("domain.pddl")?;
     let (config_name, config) = file("domain.toml")?;
     let toml = Source { name: config_name.clone(), text: config.clone() };
-    let config: Config = parse(config_name, config)?;
+    let config: Config = toml::from_str(config)
+        .map_err(|e| LoadError::Findings { findings: no_config(config_name, config, &e) })?;
     config::check(&toml, &config)?;
     let under = |prefix: &'static str| files.iter().filter(move |(key, _)| key.starts_with(prefix));
     let objects = parse_objects(&files)?;
@@ -240,14 +241,32 @@ fn parse<T: for<'de> Deserialize<'de>>(path: &str, text: &str) -> Result<T, Load
     toml::from_str(text).map_err(|e| LoadError::Findings { findings: no_toml(path, text, &e) })
 }
 
+/// Finding for a `domain.toml` that cannot be read; keys of the whole domain stand above its tables.
+fn no_config(path: &str, text: &str, error: &toml::de::Error) -> Findings {
+    let mut findings = no_toml(path, text, error);
+    let nothing = toml::from_str::<Config>("\"\" = 0").err();
+    let keys = nothing.as_ref().map(|nothing| quoted(nothing.message())).unwrap_or_default();
+    let unknown = quoted(error.message()).into_iter().next().unwrap_or_default();
+    let is_above =
+        keys.iter().skip(1).any(|key| *key == unknown) && error.message().starts_with("unknown field");
+    for finding in findings.list.iter_mut().filter(|_| is_above) {
+        finding.help = Some(format!("`{unknown}` is of the whole domain: write it above the first [table]"));
+    }
+    findings
+}
+
+/// Words in backquotes.
+fn quoted(text: &str) -> Vec<&str> {
+    text.split('`').skip(1).step_by(2).collect()
+}
+
 /// Finding for a TOML text that cannot be read, with the nearest of the names that could stand there.
 fn no_toml(path: &str, text: &str, error: &toml::de::Error) -> Findings {
     let at = error.span().unwrap_or_default();
     let span = Span { source: 0, start: at.start as u32, end: at.end as u32 };
     let (problem, mend) = toml_problem(error);
-    let mut quoted = error.message().split('`').skip(1).step_by(2);
-    let near = quoted.next().zip(Some(quoted.collect::<Vec<_>>()));
-    let near = near.and_then(|(found, known)| english::nearest(found, &known));
+    let quoted = quoted(error.message());
+    let near = quoted.split_first().and_then(|(found, known)| english::nearest(found, known));
     let mut finding = Diagnostic::error("unreadable", clipped(&problem), span, "here");
     finding.help = near.map(|near| format!("did you mean `{near}`?")).or(mend.map(str::to_string));
     Findings { sources: vec![Source::new(path, text)], list: vec![finding] }

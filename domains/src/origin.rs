@@ -54,12 +54,32 @@ pub fn remembered(domain: &Domain) -> Vec<String> {
     vocabulary.words().into_iter().filter(is_remembered).map(|w| w.name).collect()
 }
 
-/// True if a program states the values of a predicate or function, and they are unknown until a sensing
-/// action has been taken that sets them.
+/// True if a program states the values of a predicate or function, and they are unknown until an action
+/// has been taken that sets them: one that may find them out.
 pub fn is_revealed(domain: &Domain, word: &Word) -> bool {
-    let senses = |action: &str| actions::kind(&domain.config, action) == ActionKind::Sensing;
+    let may_sense = |kind: Option<ActionKind>| kind.is_none_or(|kind| kind == ActionKind::Sensing);
+    set_by(domain, word, may_sense)
+}
+
+/// True if a program states the values of a predicate or function, and a sensing action reveals them.
+pub fn is_found_out(domain: &Domain, word: &Word) -> bool {
+    set_by(domain, word, |kind| kind == Some(ActionKind::Sensing))
+}
+
+/// Action of a program that sets a predicate or function stated by a program, if it is left unsaid
+/// whether the action finds the values out or brings them about, and no other finds them out.
+pub fn unsaid<'a>(domain: &'a Domain, word: &Word) -> Option<&'a str> {
+    let is_open = is_revealed(domain, word) && !is_found_out(domain, word);
+    let mut setters = domain.vocabulary.changers(&word.name).into_iter().filter(|_| is_open);
+    setters.find(|action| actions::stated_kind(&domain.config, action).is_none())
+}
+
+/// True if a program states the values of a predicate or function, and an action sets them whose stated
+/// kind, `None` for that of a program without one, is such.
+fn set_by(domain: &Domain, word: &Word, is_such: impl Fn(Option<ActionKind>) -> bool) -> bool {
+    let sets = |action: &str| is_such(actions::stated_kind(&domain.config, action));
     matches!(of(domain, word), Origin::SensedByProgram)
-        && domain.vocabulary.changers(&word.name).into_iter().any(senses)
+        && domain.vocabulary.changers(&word.name).into_iter().any(sets)
 }
 
 /// True if an ability or a program states the values of a predicate or function.

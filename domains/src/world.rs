@@ -396,6 +396,11 @@ impl<'a> World<'a> {
         Ok(Some(Job { skill: grounded.skill(&s), limit_s }))
     }
 
+    /// True if a program carries a call out.
+    pub fn is_by_program(&self, call: &Call) -> bool {
+        self.programs.action(&call.action).is_some()
+    }
+
     fn grounded(&self, call: &Call, step: usize) -> Option<Grounded> {
         actions::grounded(self.setting.domain, call, step)
     }

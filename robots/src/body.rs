@@ -329,8 +329,8 @@ pub trait Robot: Send + Sync {
     /// Parts and abilities of the body.
     fn description(&self) -> &Description;
 
-    /// Time on the body's clock. Simulated and recorded time advances by driving, looking and sensing, not by
-    /// waiting.
+    /// Time on the body's clock. Simulated and recorded time advances by driving, looking, sensing and
+    /// [waiting](Robot::wait) alone.
     fn now_ns(&self) -> Stamp;
 
     /// Occupancy grid of the floor; `None` for a body without a map, such as a recording.
@@ -495,5 +495,15 @@ pub trait Robot: Send + Sync {
     /// [`Failure::Unable`] without a hand; [`Failure::Broken`].
     async fn hand(&self) -> Result<Hand, Failure> {
         Err(self.description().lacks(Part::Hand))
+    }
+
+    /// Stands still while something else takes `seconds`, where the clock advances by the body's own
+    /// work alone; time that passes by itself needs no waiting.
+    ///
+    /// # Errors
+    /// [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn wait(&self, seconds: f64, watch: &Watch<'_>) -> Result<(), Failure> {
+        let _ = (seconds, watch);
+        Ok(())
     }
 }

@@ -38,6 +38,8 @@ pub enum Request {
     Pour(Pouring),
     /// Report the state of the hand: [`Robot::hand`].
     Hand,
+    /// Stand still for a time, seconds: [`Robot::wait`].
+    Wait(f64),
 }
 
 impl Request {
@@ -56,6 +58,7 @@ impl Request {
             Request::Place(_) => "place",
             Request::Pour(_) => "pour",
             Request::Hand => "hand",
+            Request::Wait(_) => "wait",
         }
     }
 
@@ -63,7 +66,11 @@ impl Request {
     /// needs no base, a door may open itself, and custom sensors are checked by name.)
     pub fn needs(&self) -> Option<Part> {
         match self {
-            Request::Pose | Request::DriveTo(_) | Request::Read(_) | Request::OpenDoor(_) => None,
+            Request::Pose
+            | Request::DriveTo(_)
+            | Request::Read(_)
+            | Request::OpenDoor(_)
+            | Request::Wait(_) => None,
             Request::LookAt(_) | Request::Sense => Some(Part::Camera),
             Request::Scan => Some(Part::Laser),
             Request::PushAside(_) => Some(Part::Arm),
@@ -104,6 +111,7 @@ impl Request {
             | Request::Place(_)
             | Request::Pour(_) => body.manipulate(self, watch).await,
             Request::Hand => body.hand().await.map(Answer::Hand),
+            Request::Wait(seconds) => body.wait(*seconds, watch).await.map(|()| Answer::Waited),
             Request::Sense => match body.sense(watch).await {
                 Ok(sensed) => return (Answer::Sensed(Exposure::of(&sensed)), Some(sensed)),
                 Err(failure) => Err(failure),
@@ -128,6 +136,7 @@ impl std::fmt::Display for Request {
             Request::Place(placing) => write!(f, "put down what it holds at {}", placing.foot),
             Request::Pour(pouring) => write!(f, "pour what it holds out at {}", pouring.over),
             Request::Hand => write!(f, "say what the hand feels"),
+            Request::Wait(seconds) => write!(f, "wait {seconds:.1} s"),
         }
     }
 }
@@ -160,6 +169,8 @@ pub enum Answer {
     Poured(Poured),
     /// State of the hand, for [`Request::Hand`].
     Hand(Hand),
+    /// End of a time of standing still, for [`Request::Wait`].
+    Waited,
     /// Failure of any request.
     Failed(Failure),
 }

@@ -88,10 +88,22 @@ impl Asker<'_> {
     /// Sentence about a fact that no view can show and no other source states.
     fn untold(&self, word: &Decisive) -> String {
         let said = word.pddl().map_or_else(|| word.word.clone(), |pddl| self.saying.say(&pddl));
-        match word.is_number {
-            true => format!("it cannot be told how much {said} is: nothing gives it a value"),
-            false => format!("it cannot be told whether {said}: no look shows that, and nothing has said so"),
-        }
+        let declared = self.domain.vocabulary.word(&word.word);
+        let unsaid = declared.as_ref().and_then(|word| origin::unsaid(self.domain, word));
+        let is_found_out = declared.as_ref().is_some_and(|word| origin::is_found_out(self.domain, word));
+        let late =
+            (is_found_out && self.s.time_left_s.is_some()).then(|| "in the time that was given".into());
+        let unreached = self.closed().or(late).filter(|_| unsaid.is_none());
+        let unreached = unreached.map(|because| format!(", {because}")).unwrap_or_default();
+        let why = match (unsaid, word.is_number) {
+            (Some(action), _) => {
+                format!("the domain does not say whether ({action}) finds that out, by its `kind`")
+            }
+            (None, true) => "nothing gives it a value".into(),
+            (None, false) => "no look shows that, and nothing has said so".into(),
+        };
+        let open = if word.is_number { format!("how much {said} is") } else { format!("whether {said}") };
+        format!("it cannot be told {open}: {why}{unreached}")
     }
 
     fn thing_of(&self, word: &Decisive) -> Option<usize> {
@@ -178,15 +190,12 @@ impl Asker<'_> {
 
     /// Verdict and sentence for a question that further actions cannot settle better.
     pub(super) fn to_question(&self) -> (Verdict, String) {
-        let Judgement { value, word, .. } = self.judgement();
-        match value {
+        let judged = self.judgement();
+        let word = judged.word();
+        match judged.value {
             Truth::True => self.reached(),
-            Truth::False => {
-                (Verdict::NotFound, self.no_of_kinds().unwrap_or_else(|| self.denial(word.as_ref())))
-            }
-            Truth::Unknown => {
-                (Verdict::CannotTell, self.another().unwrap_or_else(|| self.open(word.as_ref())))
-            }
+            Truth::False => (Verdict::NotFound, self.no_of_kinds().unwrap_or_else(|| self.denial(word))),
+            Truth::Unknown => (Verdict::CannotTell, self.another().unwrap_or_else(|| self.open(word))),
         }
     }
 

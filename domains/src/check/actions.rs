@@ -5,7 +5,7 @@ use descry_skills::Call;
 
 use super::Check;
 use crate::abilities;
-use crate::ability::{SkillWord, Trace};
+use crate::ability::{Ability, SkillWord, Trace};
 use crate::actions::{doer, substituted};
 use crate::config::ActionConfig;
 use crate::origin::{self, Origin};
@@ -94,7 +94,9 @@ impl Check<'_> {
                 let help = "leave `program` or `does` out";
                 self.error("two-performers", message, self.toml.at(&["action", name]), help)
             });
-            return both.into_iter().chain(self.program(&["action", name, "program"], program)).collect();
+            let unsaid = both.is_none().then(|| self.unsaid(name)).flatten();
+            let started = self.program(&["action", name, "program"], program);
+            return both.into_iter().chain(unsaid).chain(started).collect();
         }
         if texts.is_empty() {
             let text = format!("{name} {}", parameters.join(" "));
@@ -104,6 +106,20 @@ impl Check<'_> {
             self.step(name, text, self.toml.within(&["action", name, "does"], text), "this step")
         };
         texts.iter().filter_map(step).collect()
+    }
+
+    /// Warning about an action of a program whose effects set what a program states, if it is left unsaid
+    /// whether the action finds that out or brings it about.
+    fn unsaid(&self, name: &str) -> Option<Diagnostic> {
+        let words = self.domain.vocabulary.words();
+        let word = words.iter().find(|word| origin::unsaid(self.domain, word) == Some(name))?;
+        let message = format!(
+            "`{}` is stated by a program and set by `{name}`: until it is said which of the two it does, find out or bring about, nobody knows what is not stated",
+            word.name
+        );
+        let help = "kind = \"sensing\" if the action finds it out, kind = \"changing\" if it brings it about";
+        let place = self.toml.at(&["action", name]);
+        Some(Diagnostic::warning("kind-unsaid", message, place, "this action").with_help(help))
     }
 
     /// Checks one step of an action: the skill exists and takes these arguments.
@@ -118,9 +134,10 @@ impl Check<'_> {
                 format!("no skill is called `{name}`, to carry out the action `{action}`")
             };
             let skills = abilities::used(uses).flat_map(|a| a.skills).map(|s| s.name);
+            let has_it = |ability: &&Ability| ability.skills.iter().any(|skill| skill.name == name);
             let help = format!(
                 "{}; or a program: [action.{action}] program = [\"python3\", \"{action}.py\"]",
-                self.known(name, skills)
+                unused(has_it).unwrap_or_else(|| self.known(name, skills))
             );
             return Some(Diagnostic::error("no-skill", message, span, label).with_help(help));
         };
@@ -182,18 +199,17 @@ impl Check<'_> {
             list.extend(self.marks(name, &["action", name, "because"], because, &parameters));
         }
         if let Some(check) = &config.check {
-            let (condition, objects) = self.over(name, check);
-            list.extend(self.condition(&["action", name, "check"], &condition, &objects));
+            list.extend(self.over_parameters(name, &["action", name, "check"], check));
         }
         list
     }
 
     /// Checks that a lesson from a failing action is one atom of a remembered predicate or function.
     fn teaches(&self, action: &str, path: &[&str], atom: &str) -> Option<Diagnostic> {
-        let (condition, objects) = self.over(action, atom);
-        if let Some(fault) = self.condition(path, &condition, &objects) {
+        if let Some(fault) = self.over_parameters(action, path, atom) {
             return Some(fault);
         }
+        let (condition, _) = self.over(action, atom);
         let vocabulary = &self.domain.vocabulary;
         let read = crate::words::read(&condition);
         let Ok(instances) = read else {
@@ -214,6 +230,20 @@ impl Check<'_> {
             format!("what a failure of `{action}` teaches, `{word}`, is no word that is remembered");
         let help = "name a predicate of domain.pddl that no ability states, as (given-up ?to)";
         Some(self.error("not-remembered", message, self.toml.at(path), help))
+    }
+
+    /// Checks a condition over an action's variables.
+    fn over_parameters(&self, action: &str, path: &[&str], text: &str) -> Option<Diagnostic> {
+        let (condition, objects) = self.over(action, text);
+        let fault = self.condition(path, &condition, &objects)?;
+        if fault.code != "undeclared-variable" {
+            return Some(fault);
+        }
+        let parameters = self.domain.vocabulary.action(action).unwrap_or_default();
+        let span = fault.labels.first().map(|label| label.span.start as usize..label.span.end as usize);
+        let unknown = span.and_then(|span| self.domain.toml.text.get(span)).unwrap_or_default();
+        let help = self.known(unknown, parameters.iter().map(|(name, _)| name.as_str()));
+        Some(fault.with_help(help))
     }
 
     /// Text over an action's variables with a distinct object for each, and these objects with
@@ -245,9 +275,10 @@ impl Check<'_> {
             if known.contains(&name) || programs.contains_key(name) {
                 continue;
             }
+            let has_it = |ability: &&Ability| ability.calls.iter().any(|call| call.name == name);
             let help = format!(
                 "{}; or a program: [attachments.{name}] program = [\"python3\", \"{name}.py\"]",
-                self.known(name, known.iter().copied())
+                unused(has_it).unwrap_or_else(|| self.known(name, known.iter().copied()))
             );
             let message = format!("nothing answers the call [{name}]");
             list.push(
@@ -273,4 +304,10 @@ impl Check<'_> {
         }
         list
     }
+}
+
+/// Suggestion to use the ability that has what is missing; `None` if no ability has it.
+fn unused(has_it: impl FnMut(&&Ability) -> bool) -> Option<String> {
+    let ability = abilities::ALL.iter().copied().find(has_it)?;
+    Some(format!("the ability `{}` has it: write it into `uses`", ability.name))
 }

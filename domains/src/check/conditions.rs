@@ -27,14 +27,18 @@ impl Check<'_> {
         });
         let more = more.iter().map(|(name, of)| (name.as_str(), of.as_str()));
         let mut objects: Vec<(&str, &str)> = more.chain(named).collect();
-        // Poses have their names from the body: one that a condition names may be there.
-        let mentions = mentions(condition);
+        // What has its name from the body, as poses have, may be there if a condition names it; so may
+        // every place where no scene tells them.
+        let is_body_s = |of: &str| {
+            of == "pose" || self.places.surfaces.is_empty() && ["surface", "room", "door"].contains(&of)
+        };
+        let (mentions, words) = (mentions(condition), vocabulary.words());
         for mention in &mentions {
-            let Some(word) = mention.first().and_then(|name| vocabulary.word(name)) else { continue };
-            let poses = mention[1..].iter().zip(&word.types).filter(|(_, of)| *of == "pose");
-            for (name, _) in poses.filter(|(name, _)| !name.starts_with('?')) {
+            let Some(word) = words.iter().find(|word| Some(&word.name) == mention.first()) else { continue };
+            let named = mention[1..].iter().zip(&word.types).filter(|(_, of)| is_body_s(of));
+            for (name, of) in named.filter(|(name, _)| !name.starts_with('?')) {
                 if objects.iter().all(|(known, _)| known != name) {
-                    objects.push((name.as_str(), "pose"));
+                    objects.push((name.as_str(), of.as_str()));
                 }
             }
         }
@@ -58,8 +62,9 @@ impl Check<'_> {
         let part = source.text.get(label.span.start as usize..label.span.end as usize).unwrap_or_default();
         let mut told =
             Diagnostic::error(fault.code, fault.message.clone(), self.toml.within(path, part), &label.text);
-        if let Some(help) = &fault.help {
-            told = told.with_help(help.clone());
+        let closed = (fault.code == "unbalanced").then(|| "add it at the end of this text".to_string());
+        if let Some(help) = closed.or(fault.help.clone()) {
+            told = told.with_help(help);
         }
         Some(told)
     }

@@ -61,7 +61,9 @@ impl Check<'_> {
             return vec![self.error("unjudged", message, place, help)];
         }
         let asked = Asked::of(&task, &self.domain.vocabulary);
-        self.without_looks(&asked, place).into_iter().chain(self.never_told(phrase, &asked, place)).collect()
+        let planned = self.only_planned(&asked, place);
+        let told = self.without_looks(&asked, place).or(planned).or(self.never_told(phrase, &asked, place));
+        told.into_iter().collect()
     }
 
     /// Fault of a goal about seen objects in a domain without an action that takes views.
@@ -77,6 +79,19 @@ impl Check<'_> {
         );
         let help = format!("say so of one in domain.toml: does = \"{OBSERVE} ?from ?on\"");
         Some(Diagnostic::warning("no-look", message, place, "here").with_help(help))
+    }
+
+    /// Fault of a goal about a fact that changes within a plan alone, and so never comes about.
+    fn only_planned(&self, asked: &Asked, place: Span) -> Option<Diagnostic> {
+        let vocabulary = &self.domain.vocabulary;
+        let is_planned = |name: &&String| {
+            let word = vocabulary.word(name);
+            word.is_some_and(|word| matches!(origin::of(self.domain, &word), Origin::Planned))
+        };
+        let name = asked.words.iter().map(|(name, _)| name).find(is_planned)?;
+        let message = format!("`{name}` changes within a plan alone: no run ever brings it about");
+        let help = format!("leave `is = \"planned\"` out of [word.{name}]; it is remembered then");
+        Some(Diagnostic::warning("only-planned", message, place, "here").with_help(help))
     }
 
     /// Fault of a question about a fact that neither views nor another source tell.
@@ -98,8 +113,13 @@ impl Check<'_> {
         let message = format!(
             "the answer is always that it cannot be told: no look tells `{name}`, and a question changes nothing"
         );
+        let is_number = vocabulary.word(name).is_some_and(|word| word.is_number);
+        let at_first = match is_number {
+            true => format!("[\"(= ({name} …) 0)\"]"),
+            false => format!("[\"({name} …)\"] or [\"(not ({name} …))\"]"),
+        };
         let help = format!(
-            "say how it is at first, init = [\"({name} …)\"] or [\"(not ({name} …))\"], or who states it: [word.{name}] program = […]"
+            "say how it is at first, init = {at_first}, or who states it: [word.{name}] program = […]"
         );
         Some(Diagnostic::warning("never-told", message, place, "here").with_help(help))
     }

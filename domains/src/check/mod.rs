@@ -33,7 +33,10 @@ pub fn findings(domain: &Domain) -> Findings {
     let places = Places::of_scene(domain);
     let lexicon = Lexicon::new(domain, &places);
     let check = Check { domain, toml: TomlPlaces::of(&domain.toml.text), places, lexicon };
-    let mut list = check.actions();
+    // First what other findings may follow from.
+    let mut list = check.abilities();
+    list.extend(check.scenes());
+    list.extend(check.actions());
     list.extend(check.traces());
     list.extend(check.calls());
     list.extend(check.words());
@@ -41,7 +44,6 @@ pub fn findings(domain: &Domain) -> Findings {
     list.extend(check.open());
     list.extend(check.minimise());
     list.extend(check.phrases());
-    list.extend(check.scenes());
     let mut sources = vec![domain.pddl.clone(), domain.toml.clone()];
     sources.extend(scenes::scenes(domain));
     list.extend(check.alike(sources.len()));

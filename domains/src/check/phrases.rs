@@ -80,6 +80,10 @@ impl Check<'_> {
         let mut filled: Vec<Filled> = Vec::new();
         let mut faults = Vec::new();
         let place = |part: &str| self.toml.within(&["goal", n, "say"], part);
+        if phrase.say.matches('<').count() != phrase.say.matches('>').count() {
+            let message = "a slot is opened and not closed, or closed and not opened".to_string();
+            faults.push(self.error("slots", message, place(&phrase.say), "a slot is written as <surface>"));
+        }
         for slot in slots_of(&phrase.say) {
             let (of, tag) = (type_of_slot(slot), format!("<{slot}>"));
             let named = self.lexicon.of_type(of).first();
@@ -180,6 +184,11 @@ impl Check<'_> {
             let help = "expected an atom with at most one question mark, as in {(on <thing> ?)}";
             return Some(self.error("answer", message, self.toml.within(path, atom), help));
         };
+        if mention.iter().filter(|argument| *argument == "?").count() > 1 {
+            let message = format!("`{atom}` asks for two objects at once");
+            let help = "leave one question mark, as in {(on <thing> ?)}";
+            return Some(self.error("answer", message, self.toml.within(path, atom), help));
+        }
         let vocabulary = &self.domain.vocabulary;
         let Some(word) = vocabulary.word(&mention[0]) else {
             let words: Vec<String> = vocabulary.words().into_iter().map(|w| w.name).collect();

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use descry_planner::Diagnostic;
 
 use super::Check;
+use crate::config::Source;
 use crate::origin::{self, Origin};
 use crate::symbol::{SENSE, symbol};
 use crate::vocabulary::Word;
@@ -44,7 +45,7 @@ impl Check<'_> {
                     list.push(never_defined(&word));
                 }
                 Origin::Remembered if self.is_compared_unset(&word) => list.push(not_begun(&word)),
-                Origin::Fixed if !self.begins(&word) => {
+                Origin::Fixed if !self.begins(&word) && !vocabulary.is_changed(&word.name) => {
                     let name = &word.name;
                     let message =
                         format!("nothing states `{name}`, and no action changes it: it never holds");
@@ -71,6 +72,12 @@ impl Check<'_> {
                         format!("`{name}` is derived by the domain's rules; nothing else states it");
                     let help = "leave this out, or the rule in domain.pddl";
                     list.push(self.error("derived", message, self.toml.at(&["word", name]), help));
+                }
+                Some(_) if configured.is == Some(Source::Fixed) && vocabulary.is_changed(name) => {
+                    let by = vocabulary.changers(name).join("`, `");
+                    let message = format!("`{name}` is changed by `{by}`: it is not fixed");
+                    let help = "leave `is` out; it is remembered then, and changes as the actions say";
+                    list.push(self.error("not-fixed", message, self.toml.at(&["word", name, "is"]), help));
                 }
                 Some(_) => {}
             }
@@ -189,7 +196,14 @@ impl Check<'_> {
                 }
             };
             if let Some(fault) = self.condition(&path, line, &[]) {
-                list.push(fault);
+                let hyphened = instances.iter().find_map(|(_, arguments, _)| self.hyphened(arguments));
+                let help = hyphened.filter(|_| fault.code == "arity");
+                list.push(match help {
+                    Some(name) => {
+                        fault.with_help(format!("a name of several words has hyphens here: {name}"))
+                    }
+                    None => fault,
+                });
                 continue;
             }
             let is_sensed = |(name, ..): &&(String, Vec<String>, Option<f64>)| {
@@ -219,6 +233,16 @@ impl Check<'_> {
         list
     }
 
+    /// Known name that consecutive arguments make up, as `left-bench` for `left bench`.
+    fn hyphened(&self, arguments: &[String]) -> Option<String> {
+        let types = &self.domain.vocabulary.task.types;
+        let is_name = |joined: &String| {
+            types.iter().any(|of| self.lexicon.of_type(&of.name).iter().any(|name| name.symbol == *joined))
+        };
+        let joined = |count: usize| arguments.windows(count).map(|words| words.join("-"));
+        (2..=arguments.len()).flat_map(joined).find(is_name)
+    }
+
     /// Checks that the types whose objects may be named freely (`open`) exist.
     pub(super) fn open(&self) -> Vec<Diagnostic> {
         let vocabulary = &self.domain.vocabulary;
@@ -232,17 +256,22 @@ impl Check<'_> {
         unknown.map(told).collect()
     }
 
-    /// Checks that the used abilities exist, and that objects of the domain's own types have valid,
-    /// unique names.
+    /// Checks that the used abilities exist.
+    pub(super) fn abilities(&self) -> Vec<Diagnostic> {
+        let abilities = || abilities::ALL.iter().map(|a| a.name);
+        let used = self.domain.config.uses.iter().enumerate();
+        let told = |(n, name): (usize, &String)| {
+            let message = format!("there is no ability \"{name}\"");
+            let place = self.toml.at(&["uses", &n.to_string()]);
+            self.error("no-ability", message, place, self.known(name, abilities()))
+        };
+        used.filter(|(_, name)| abilities().all(|a| a != *name)).map(told).collect()
+    }
+
+    /// Checks that objects of the domain's own types have valid, unique names.
     pub(super) fn objects(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
-        let abilities = || abilities::ALL.iter().map(|a| a.name);
-        for (n, name) in config.uses.iter().enumerate().filter(|(_, n)| abilities().all(|a| a != *n)) {
-            let message = format!("there is no ability \"{name}\"");
-            let place = self.toml.at(&["uses", &n.to_string()]);
-            list.push(self.error("no-ability", message, place, self.known(name, abilities())));
-        }
         let mut taken: Vec<(String, &str)> = Vec::new();
         for (of, names) in &config.objects {
             let key = self.toml.at(&["objects", of]);

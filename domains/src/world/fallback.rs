@@ -21,6 +21,9 @@ impl World<'_> {
         if self.is_beyond_looks(round) {
             return Choice::Nothing(NOTHING_LEFT.into());
         }
+        if let Some(choice) = self.reveals_to_question(round) {
+            return choice;
+        }
         let all = self.own_fallback(s).unwrap_or_else(|| looks::look_deeds(s));
         match self.first_of(round, &all) {
             Some(choice) => choice,
@@ -66,36 +69,55 @@ impl World<'_> {
         self.judgement(round).is_some_and(|judged| judged.is_open_to_looks())
     }
 
-    /// True if the goal is a question that depends on a fact which neither views nor other sensing
-    /// actions can tell.
+    /// True if the goal is a question that depends on facts of which neither views nor other sensing
+    /// actions can tell any.
     pub(super) fn is_beyond_looks(&self, round: &Round) -> bool {
         let of_no_look = |judged: Judgement| {
             let is_open = judged.value == Truth::Unknown;
-            judged.word.is_some_and(|word| !(word.is_seen || is_open && self.is_revealed(&word)))
+            let may_be_told = |word: &Decisive| word.is_seen || is_open && self.is_revealed(word);
+            !judged.words.is_empty() && !judged.words.iter().any(may_be_told)
         };
         self.setting.goal.question && self.judgement(round).is_some_and(of_no_look)
     }
 
-    /// True if a sensing action can still tell the value of a fact that a program states.
-    fn is_revealed(&self, word: &Decisive) -> bool {
+    /// True if a sensing action can still tell a fact that a program states.
+    fn is_revealed(&self, fact: &Decisive) -> bool {
         let domain = self.setting.domain;
-        domain.vocabulary.word(&word.word).is_some_and(|word| origin::is_revealed(domain, &word))
+        let is_told = || {
+            let objects: Option<Vec<String>> = fact.objects.iter().cloned().collect();
+            objects.is_some_and(|objects| self.mind.words.is_told(&fact.word, &objects))
+        };
+        let word = domain.vocabulary.word(&fact.word);
+        word.is_some_and(|word| origin::is_found_out(domain, &word)) && !is_told()
     }
 
-    /// Choice of a plan for the sensing actions that reveal the fact which leaves the goal open; `None`
-    /// if no such action is left to try.
+    /// Choice of a plan for the sensing actions that reveal one of the facts which leave the goal open;
+    /// `None` if no such action is left to try.
     fn reveals(&mut self, round: &Round) -> Option<Choice> {
         let judged = self.judgement(round).filter(|judged| judged.value == Truth::Unknown)?;
-        let word = judged.word.filter(|word| !word.is_number && self.is_revealed(word))?;
-        let (pddl, goal) = (word.pddl()?, self.goal_now(&round.situation));
-        let aim = Deed::new("reveal", [pddl.clone()]);
-        if self.barred.contains(&aim) {
-            return None;
+        let goal = self.goal_now(&round.situation);
+        for fact in judged.words.iter().filter(|fact| self.is_revealed(fact)) {
+            let Some(atom) = fact.pddl() else { continue };
+            // Whatever its value is to be: a number equals itself once it has one.
+            let pddl = if fact.is_number { format!("(= {atom} {atom})") } else { atom };
+            let aim = Deed::new("reveal", [pddl.clone()]);
+            if self.barred.contains(&aim) {
+                continue;
+            }
+            let mut task = words::with_goal(self.setting.domain, &round.problem, &goal, &pddl).ok()?;
+            actions::only_looking(&self.setting.domain.config, &mut task);
+            self.heading_for = Some(aim);
+            return Some(Choice::Towards { task: Box::new(task), then: Plan::default() });
         }
-        let mut task = words::with_goal(self.setting.domain, &round.problem, &goal, &pddl).ok()?;
-        actions::only_looking(&self.setting.domain.config, &mut task);
-        self.heading_for = Some(aim);
-        Some(Choice::Towards { task: Box::new(task), then: Plan::default() })
+        None
+    }
+
+    /// Choice of the sensing actions that reveal a fact which leaves a question open, though no plan was
+    /// found that answers it with yes.
+    fn reveals_to_question(&mut self, round: &Round) -> Option<Choice> {
+        let choice = self.setting.goal.question.then(|| self.reveals(round)).flatten();
+        self.is_unasked = choice.is_some();
+        choice
     }
 
     /// Choice of a view to take before accepting a goal that holds by absence of evidence: the one that
@@ -145,6 +167,9 @@ impl World<'_> {
     pub fn in_time(&mut self, round: &Round) -> Choice {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
+        if let Some(choice) = self.reveals_to_question(round) {
+            return choice;
+        }
         let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
         let is_asked = self.setting.goal.question && self.is_open_to_looks(round);
         let is_of_objects =

@@ -15,7 +15,7 @@ use crate::note::Note;
 use crate::round::Round;
 use crate::situation::Situation;
 use crate::symbol::symbol;
-use crate::{abilities, eyes, origin, words};
+use crate::{abilities, english, eyes, origin, words};
 
 impl World<'_> {
     /// Updates the world model from the outcome of a call's part; returns a sentence, empty if its
@@ -172,7 +172,7 @@ impl World<'_> {
         let given_up = actions::substituted(domain, call, &config.gives_up);
         self.say_all(&given_up)?;
         if given_up.is_empty() || tries > limit + 1 {
-            self.given_up = Some(format!("{call} has failed {tries} times: {failure}"));
+            self.given_up = Some(format!("{call} has failed {}: {failure}", english::times(tries)));
         }
         Ok(Lesson::GivenUp { facts: given_up })
     }

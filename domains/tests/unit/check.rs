@@ -106,6 +106,18 @@ fn faults_of_actions_and_calls_are_found_at_their_place() {
         &["out-of-reach"],
     );
     toml(
+        ("[\"(out-of-reach ?to)\"]", "[\"(out-of-reach ?too)\"]"),
+        "undeclared-variable",
+        "?too",
+        &["did you mean `?to`", "?from"],
+    );
+    toml(
+        ("\"move ?from ?to\"", "\"pick-up ?from ?to\""),
+        "no-skill",
+        "pick-up ?from ?to",
+        &["the ability `carrying` has it: write it into `uses`"],
+    );
+    toml(
         ("[\"(out-of-reach ?to)\"]", "[\"(out-of-reach ?to)\", \"(at ?to)\"]"),
         "not-remembered",
         "\"(at ?to)\"",
@@ -150,7 +162,7 @@ fn faults_of_words_and_objects_are_found_at_their_place() {
         |change: (&str, &str), code, place, words: &[&str]| check("domain.pddl", change, code, place, words);
     let toml =
         |change: (&str, &str), code, place, words: &[&str]| check("domain.toml", change, code, place, words);
-    let top = "scene = \"default\"\n";
+    let (top, more) = ("scene = \"default\"\n", "[action.observe]");
     let with = |text: &str| format!("{top}{text}\n");
     pddl(
         ("(on ?what - thing ?on - surface)", "(on ?what ?on - surface)"),
@@ -166,6 +178,8 @@ fn faults_of_words_and_objects_are_found_at_their_place() {
         "\"fixed\"",
         &["leave"],
     );
+    let below = format!("{more}\ninit = []");
+    toml((more, &below), "unreadable", "init", &["above the first [table]"]);
     toml((top, &with("init = [\"(observed table\"]")), "init", "\"(observed table\"", &["expected"]);
     toml((top, &with("init = [\"(at start)\"]")), "init", "\"(at start)\"", &["sensed"]);
     toml((top, &with("init = [\"(observed table-1 shelf)\"]")), "undeclared-object", "shelf", &["table"]);
@@ -214,6 +228,9 @@ fn faults_of_phrases_are_found_at_their_place() {
     toml((about, &answer("{(on ? <thing>)}")), "wrong-type", "(on ? <thing>)", &["thing"]);
     toml((about, &answer("on {(on <thing> ?)")), "answer", "\"on {(on <thing> ?)\"", &["not closed"]);
     toml((about, &answer("<cup>")), "slots", "<cup>", &["it has <thing>"]);
+    toml((about, &answer("{(on ? ?)}")), "answer", "(on ? ?)", &["two objects at once"]);
+    toml((say, "say = \"find <thing\""), "slots", "find <thing", &["opened and not closed"]);
+    toml((means, "(on <thing> table"), "unbalanced", "(", &["at the end of this text"]);
 }
 
 #[test]
@@ -247,6 +264,9 @@ fn faults_of_scenes_and_places_are_found_at_their_place() {
         |change: (&str, &str), code, place, words: &[&str]| check("domain.toml", change, code, place, words);
     let scene = "scene = \"default\"\n";
     toml((scene, "scene = \"defualt\"\n"), "no-scene", "\"defualt\"", &["did you mean `default`"]);
+    // Which places there are is unknown then.
+    let named = "scene = \"defualt\"\ninit = [\"(observed table-1 table)\"]\n";
+    toml((scene, named), "no-scene", "\"defualt\"", &["did you mean `default`"]);
     toml((scene, "scene = \"default\"\nsurfaces = [\"shelf\"]\n"), "no-surface", "\"shelf\"", &["table"]);
     let expect =
         |what: &str, at: &str| format!("{scene}[[expect]]\nwhat = \"{what}\"\nat = \"{at}\"\nweight = 2.0\n");
@@ -284,6 +304,19 @@ fn check_codes(edits: &[(&str, &str, &str)], expected: &[&str]) {
 }
 
 #[test]
+fn what_actions_change_is_neither_fixed_nor_planned_alone() {
+    let goal = "[[goal]]\nsay = \"look\"\nmeans = \"(observed table-1 table)\"\n[said]";
+    let check = |is: &str, expected: &[&str]| {
+        let more = format!("[word.observed]\nis = \"{is}\"\n{goal}");
+        let unteach = ("domain.toml", "gives_up = [\"(observed ?from ?on)\"]", "");
+        check_codes(&[("domain.toml", "[said]", more.as_str()), unteach], expected);
+    };
+    check("fixed", &["not-fixed"]);
+    check("planned", &["only-planned"]);
+    check("remembered", &[]);
+}
+
+#[test]
 fn what_no_look_tells_is_found() {
     let shine = "(:durative-action shine :parameters (?from - pose) :duration (= ?duration 1)\n  \
                  :condition (at start (at ?from)) :effect (at end (shiny ?from)))\n  (:durative-action move";
@@ -312,6 +345,12 @@ fn what_no_look_tells_is_found() {
     check("false", "", "", &[]);
     check("true", "kind = \"sensing\"", "", &[]);
     check("true", "", "init = [\"(shiny start)\"]\n", &[]);
+    // Where a program states it, whether the action finds it out must be said.
+    let stated = "[word.shiny]\nprogram = [\"sh\"]\n";
+    check("true", stated, "", &["kind-unsaid"]);
+    for kind in ["sensing", "changing"] {
+        check("true", &format!("kind = \"{kind}\"\n{stated}"), "", &[]);
+    }
 }
 
 #[test]

@@ -41,7 +41,9 @@ impl<'a> Arguments<'a> {
     /// Arguments of a request; `route_m` is the route on the map and is sent with a drive only.
     pub fn of(request: &'a Request, route_m: &'a [Point2<f64>]) -> Self {
         match request {
-            Request::Pose | Request::Sense | Request::Scan | Request::Hand => Arguments::Nothing {},
+            Request::Pose | Request::Sense | Request::Scan | Request::Hand | Request::Wait(_) => {
+                Arguments::Nothing {}
+            }
             Request::DriveTo(to) => Arguments::DriveTo { to, route_m },
             Request::LookAt(point_m) => Arguments::LookAt { point_m },
             Request::Read(sense) => Arguments::Sense { sense },

@@ -420,6 +420,14 @@ impl Robot for ProgramRobot {
         let done = self.ask(&Request::Hand, &Watch::default()).await?;
         self.hold(answer("hand", done.said)).await
     }
+
+    /// Reads the clock, which runs by itself, with the next answer of the program.
+    async fn wait(&self, _seconds: f64, _watch: &Watch<'_>) -> Result<(), Failure> {
+        match self.pose().await {
+            Err(broken @ Failure::Broken { .. }) => Err(broken),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl ProgramRobot {

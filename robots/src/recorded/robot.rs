@@ -332,4 +332,10 @@ impl Robot for RecordedRobot {
         }
         self.play()
     }
+
+    async fn wait(&self, seconds: f64, watch: &Watch<'_>) -> Result<(), Failure> {
+        go_on(watch, "waiting")?;
+        self.pass(seconds);
+        Ok(())
+    }
 }

@@ -192,7 +192,12 @@ impl TapedRobot {
                 state.at = answer.place().copied().or(state.at);
                 match request {
                     Request::LookAt(point) => state.gaze = Some(point),
-                    Request::Pose | Request::Sense | Request::Scan | Request::Read(_) | Request::Hand => {}
+                    Request::Pose
+                    | Request::Sense
+                    | Request::Scan
+                    | Request::Read(_)
+                    | Request::Hand
+                    | Request::Wait(_) => {}
                     _ => state.gaze = None,
                 }
                 Ok((answer, sensed))
@@ -433,6 +438,13 @@ impl Robot for TapedRobot {
     async fn hand(&self) -> Result<Hand, Failure> {
         match self.ask(Request::Hand, &Watch::default()).await? {
             (Answer::Hand(hand), _) => Ok(hand),
+            (other, _) => Err(other.strange()),
+        }
+    }
+
+    async fn wait(&self, seconds: f64, watch: &Watch<'_>) -> Result<(), Failure> {
+        match self.ask(Request::Wait(seconds), watch).await? {
+            (Answer::Waited, _) => Ok(()),
             (other, _) => Err(other.strange()),
         }
     }

@@ -550,4 +550,10 @@ impl Robot for SimRobot {
     async fn hand(&self) -> Result<Hand, Failure> {
         Ok(Hand { holds: self.lock().held().is_some() })
     }
+
+    async fn wait(&self, seconds: f64, watch: &Watch<'_>) -> Result<(), Failure> {
+        go_on(&watch.cancel, "waiting")?;
+        self.lock().pass(seconds);
+        Ok(())
+    }
 }

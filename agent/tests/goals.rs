@@ -248,17 +248,18 @@ fn a_question_of_what_no_one_has_seen_is_answered_by_looking() {
 }
 
 #[test]
-fn a_place_is_cleared_and_a_thing_leaves_its_place() {
-    let check = |means: &str, seed: u64| {
+fn what_stands_in_the_way_is_taken_though_nobody_named_it() {
+    let check = |means: &str, seed: u64, verdict: Verdict| {
         let scratch = tempfile::TempDir::new().expect("a folder can be made");
         let domain = Which::Home.domain(means, false, &mut Draws(1), scratch.path());
         let came = lived(&domain, "check it", "two-rooms", seed, policies::PLAN);
         let came = came.unwrap_or_else(|e| panic!("{means}: {e}"));
-        assert_eq!(came.report.verdict, Verdict::Achieved, "{means}: {}", came.report.why);
+        assert_eq!(came.report.verdict, verdict, "{means}: {}", came.report.why);
         assert!(came.done.iter().any(|(call, _)| call.action == "pick-up"), "{means}: {:?}", came.done);
     };
-    check("(not (on cup-a desk))", 1);
-    check("(and (>= (clarity desk) 0.8) (forall (?t - thing) (not (on ?t desk))))", 1);
+    check("(not (on cup-a desk))", 1, Verdict::Achieved);
+    // What stands in the way is taken though nobody named it; that nothing else stands there is not sure.
+    check("(forall (?t - thing) (not (on ?t desk)))", 7, Verdict::CannotTell);
 }
 
 #[test]

@@ -274,7 +274,7 @@ fn what_is_shown_of_a_run_says_what_its_verdict_rests_on() {
     let shown = binary::outcome(folder.path(), &["show", "run"]);
     let text = String::from_utf8_lossy(&shown.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(shown.status.success(), "{text}");
-    for part in ["rests on end ", " (the goal held), belief ", "cup A: sure with 0.85 (0.80 is wanted); "] {
+    for part in ["rests on end ", " (the goal held), belief ", "cup A: sure with 0.86 (0.80 is wanted); "] {
         assert!(text.contains(part), "{part}: {text}");
     }
     // What hangs on sides of the cup that no look showed is not said to be left of a goal that holds.
@@ -337,7 +337,7 @@ fn what_is_nearly_hidden_is_pushed_for_and_what_a_slip_leaves_is_said() {
 #[test]
 fn a_recorded_body_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
-    binary::check(folder.path(), &["find", "cup A", "--seed", "8", "--run", "first", "--json"], 0);
+    binary::check(folder.path(), &["find", "cup A", "--seed", "6", "--run", "first", "--json"], 0);
     let again = ["find", "cup A", "--robot", "recorded:first", "--run", "run", "--json"];
     binary::check(folder.path(), &again, 0);
     let words =

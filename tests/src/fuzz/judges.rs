@@ -92,7 +92,7 @@ thread_local! {
     };
 }
 
-/// Sentence: suggested alternatives are understood.
+/// Sentence: suggested alternatives are understood with a name in each open slot.
 pub fn phrase(input: &[u8]) {
     let said = String::from_utf8_lossy(input);
     let read = |said: &str| -> Result<Goal, GoalError> {
@@ -101,8 +101,17 @@ pub fn phrase(input: &[u8]) {
     let Err(why) = read(&said) else { return };
     let why = why.to_string();
     let meant = why.lines().find_map(|line| line.trim_start().strip_prefix("did you mean "));
+    // A slot that is left open takes any name.
+    let filled = |offered: &str| {
+        let name = |of: &str| SPOKEN.with(|(_, lexicon)| lexicon.of_type(of)[0].names[0].clone());
+        let word = |word: &str| match word.strip_prefix('<').and_then(|word| word.strip_suffix('>')) {
+            Some(of) => name(of),
+            None => word.to_owned(),
+        };
+        offered.split(' ').map(word).collect::<Vec<_>>().join(" ")
+    };
     for offered in meant.into_iter().flat_map(|line| line.split('"').skip(1).step_by(2)) {
-        assert!(read(offered).is_ok(), "{offered:?} is offered for {said:?}, and is not understood");
+        assert!(read(&filled(offered)).is_ok(), "{offered:?} is offered for {said:?}, and is not understood");
     }
 }
 

@@ -53,7 +53,7 @@ pub struct Task<'a> {
 
 /// Means of a caller to stop and observe a run.
 pub struct Watcher<'a> {
-    /// Stop signal; stops the body first.
+    /// Stop signal; the body is stopped before the run ends.
     pub stop: &'a Stop,
     /// Receives every event of the run.
     pub tell: &'a mut dyn FnMut(&Event),

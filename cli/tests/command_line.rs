@@ -594,8 +594,8 @@ fn a_run_can_be_shown() {
     assert_eq!(made.status.code(), Some(0), "{:?}", shown(&made));
     let again = descry(&["find", "cup A", "--run", "here"], folder.path());
     assert_eq!(again.status.code(), Some(2), "a run is not written over: {:?}", shown(&again));
-    let (out, _) = shown(&descry(&["show", "here"], folder.path()));
-    assert!(out.contains("goal      find cup A") && out.contains("achieved"), "{out}");
-    let (out, _) = shown(&descry(&["runs", "."], folder.path()));
-    assert!(out.contains("here") && out.contains("achieved"), "{out}");
+    for (arguments, part) in [(["show", "here"], "goal      find cup A"), (["runs", "."], "here")] {
+        let (out, _) = shown(&descry(&arguments, folder.path()));
+        assert!(out.contains(part) && out.contains("achieved"), "{out}");
+    }
 }

@@ -28,7 +28,7 @@ pub mod kind {
     pub const TRANSFORMS: &str = "transforms";
     /// A static transform.
     pub const STATIC_TRANSFORM: &str = "static_transform";
-    /// A line of the log.
+    /// Kind of a document that holds a line of the log.
     pub const LOG: &str = "log";
 }
 

@@ -22,9 +22,9 @@ fn rank(count: usize, share: f64) -> usize {
     ((count - 1) as f64 * share).round() as usize
 }
 
-/// Size of the sample that estimates a limit. From: work.
+/// Number of sampled values from which a bound of the quantile is estimated. From: work.
 const SAMPLE: usize = 64;
-/// Minimum number of values for estimating a limit from a sample. From: work.
+/// Minimum number of values for which a bound is estimated from a sample. From: work.
 const WORTH_IT: usize = 4 * SAMPLE;
 
 /// [`quantile`], fast for shares near 0 and 1, without reordering the values.

@@ -20,6 +20,7 @@ mod published;
 pub mod rays;
 mod resting;
 mod settle;
+mod stranger;
 mod toppled;
 #[doc(hidden)]
 pub mod upper;

@@ -11,7 +11,7 @@ use crate::mind::{LastMerged, Mind};
 use crate::surface::KnownSurface;
 use crate::symbol::symbol;
 
-/// Height tolerance around a mapped surface for merging points, metres.
+/// Maximum height of a point above or below a mapped surface for the point to be merged, metres.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// Maximum height difference between an observed level surface and that of the map, metres; beyond
 /// it, the surface is another or the body is lost.

@@ -19,7 +19,8 @@ const NEAR_M: [f64; 5] = [0.04, 0.03, 0.02, 0.015, 0.012];
 /// Depth below the plane from which a return was seen past the surface, metres. From: chosen, thicker than a
 /// board is rough.
 const PAST_M: f64 = 0.04;
-/// Maximum distance of the pixels between which an edge lies; beside edges, returns are missing. From: chosen.
+/// Maximum distance between the two pixels on either side of a depth edge, pixels; more than one because returns are
+/// missing beside edges. From: chosen.
 const GAP_PX: usize = 4;
 /// Minimum number of points for fitting a plane. From: chosen.
 const FEWEST: usize = 40;

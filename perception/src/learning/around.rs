@@ -111,8 +111,8 @@ pub fn trajectories(
     strings
 }
 
-/// Sequence with an end nearest to the body by route, reversed if that end is its last; among ties the longest, as each
-/// sequence costs camera tracking anew (section IV-A). `None` if no sequence is reachable.
+/// Sequence of poses of which one end is nearest to the robot by route, reversed if that end is its last; among ties the
+/// longest, because camera tracking begins anew with each sequence (section IV-A of the paper on learning). `None` if no sequence is reachable.
 pub fn nearest(
     strings: &[Vec<Point2<f64>>],
     here: &Point2<f64>,

@@ -147,7 +147,8 @@ pub struct RoomMap {
 }
 
 impl RoomMap {
-    /// Start and end points of walls and cylinders on the floor, as straight lines, metres.
+    /// Line segments (start, end) in which walls and cylinders meet the floor, map frame, metres; the arc of a cylinder is
+    /// replaced by chords.
     pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> + '_ {
         let of_walls = self.walls.iter().flat_map(Wall::feet);
         of_walls.chain(self.cylinders.iter().flat_map(UprightCylinder::feet))

@@ -41,7 +41,7 @@ const DROPPED: u32 = u32::MAX;
 /// Mark, in place of a plane number, of a return off the planes. From: mark.
 const THING: u32 = u32::MAX - 1;
 
-/// A return that is fused.
+/// Depth measurement of a pixel, to be fused into the merged cloud.
 #[derive(Clone, Copy)]
 pub(super) struct DepthSample {
     /// Position in the camera frame, metres.

@@ -6,11 +6,10 @@
 //! under every hypothesis, so that doubt stays.
 
 use super::Recogniser;
-use super::ends::Side;
 use super::evidence::{Looked, Measured, Setting, measure, rays_around};
 use super::likelihood::{
-    HEIGHTS, STRANGER, WIDTHS, alike_sides_log, box_sides_log, diameter_log, diameter_sigma_m, form_log,
-    handle_log, height_log, inside, log_sum, other_taper_log, round_log, sides_log, taper_log, top_log,
+    HEIGHTS, WIDTHS, alike_sides_log, box_sides_log, diameter_log, form_log, handle_log, height_log, log_sum,
+    other_taper_log, round_log, sides_log, taper_log, top_log,
 };
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::necked::{self, Necked};
@@ -18,11 +17,12 @@ use super::parting::{Held, Standing, parted_log, within_log};
 use super::percept::{Percept, Stance, kinds};
 use super::rays::PIXELS;
 use super::resting::{self, Resting};
+use super::stranger::stranger_log;
 use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor};
 use crate::pool;
-use crate::scale::{APART_M, EDGE_M};
+use crate::scale::APART_M;
 use crate::segment::{Scene, Segment, middle};
 use crate::surface::nearest_sigma_m;
 use crate::visibility::Visibility;
@@ -71,12 +71,12 @@ impl Default for Descry {
 }
 
 /// Family of everyday objects: prior share, form, upper end and handle, with broad sizes.
-struct Family {
+pub(super) struct Family {
     share: f64,
     /// Form of the body; `None` is neither round nor a box.
-    shape: Option<Shape>,
-    top: Top,
-    handle: Handle,
+    pub(super) shape: Option<Shape>,
+    pub(super) top: Top,
+    pub(super) handle: Handle,
     /// Median, metres, and log-normal spread of the height.
     height: (f64, f64),
     /// Median, metres, and log-normal spread of the width.
@@ -542,37 +542,6 @@ impl Descry {
 
 /// Minimum standard deviation of an object's position, metres. From: chosen.
 const LEAST_PLACE_SIGMA_M: f64 = 0.001;
-/// Log probability that an object of a family, as measured, is of no known kind.
-fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {
-    let known = models.iter().map(|model| covers(model, family, m)).fold(0.0, f64::max);
-    (1.0 - known).max(STRANGER).ln()
-}
-
-/// Probability that an object of a family, as measured, is described by a model: same shape, upper
-/// end and handle, and sizes within the model's ranges. A model with single values describes no
-/// others.
-fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
-    let same_make =
-        family.shape == Some(model.shape) && model.top == family.top && model.handle == family.handle;
-    if !same_make || m.top_hidden {
-        return 0.0;
-    }
-    let wide = match (model.shape, &m.sides) {
-        (Shape::Round, _) => model
-            .diameter_m
-            .filter(|_| m.round.is_some())
-            .map(|diameter| inside(2.0 * m.evidence.radius_m, diameter_sigma_m(m), diameter)),
-        (Shape::Box, Some([a, b])) => model.width_m.zip(model.depth_m).map(|(width, depth)| {
-            let both = |one: &Side, other: &Side| {
-                inside(one.likeliest_m(), EDGE_M, width) * inside(other.likeliest_m(), EDGE_M, depth)
-            };
-            both(a, b).max(both(b, a))
-        }),
-        (Shape::Box, None) => None,
-    };
-    wide.map_or(0.0, |wide| wide * inside(m.height_m, m.height_sigma_m, model.height_m))
-}
-
 #[allow(clippy::too_many_arguments)]
 fn percept(
     scene: &Scene,

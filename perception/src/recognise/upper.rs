@@ -15,9 +15,9 @@ const BAD_VIEW: f64 = 0.002;
 pub struct Upper {
     /// Log likelihood ratio of an open against a closed end.
     pub open_log: f64,
-    /// Share of the rays into the end that ended below the rim's height; 0 without rays.
+    /// Share of the rays towards the upper end that met something below the rim's height; 0 without rays.
     pub open: f64,
-    /// Share of the rays into the end that ended at or above the rim's height; 0 without rays.
+    /// Share of the rays towards the upper end that met something at or above the rim's height; 0 without rays.
     pub lid: f64,
 }
 

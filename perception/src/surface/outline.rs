@@ -62,8 +62,8 @@ impl Rows {
         Rows { outline, low_m, rows: (0..count).map(row).collect() }
     }
 
-    /// True if a point lies above or below the outline; `flat`: the point in the surface's frame,
-    /// `place`: the same point in the world.
+    /// True if a point, projected along the surface's normal, lies within the outline; `flat` is the
+    /// point in the surface's frame, `place` the same point in the world frame, metres.
     #[inline(always)]
     pub fn covers(&self, flat: &Point3<f64>, place: &Point3<f64>) -> bool {
         let row = (flat.y - self.low_m) * (1.0 / ROW_M);
@@ -78,7 +78,7 @@ impl Rows {
 
 impl Row {
     fn of(flat: &Outline, ends_m: [f64; 2]) -> Row {
-        /// Maximum component of a normal along the row for an edge that runs along the row.
+        /// An edge is parallel to the row if its normal's component along the row is at most this.
         /// From: rounding.
         const ALONG: f64 = 1e-9;
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);

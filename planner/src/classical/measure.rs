@@ -15,7 +15,7 @@ pub struct ClassicalMeasure {
 
 #[derive(Clone, Debug)]
 enum Kind {
-    /// Plan cost is the sum of `estimates`.
+    /// Plan cost is the sum of fixed operator costs, those in `estimates`.
     Sum,
     /// Plan cost is a sum of operator costs that depend on the state before the operator; each is
     /// multiplied by the sign (-1 to maximise).

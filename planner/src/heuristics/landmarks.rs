@@ -58,7 +58,7 @@ struct Find<'a> {
     supporters: Vec<u32>,
     /// Number of unreachable or lost preconditions, by operator and axiom.
     lacking: Vec<u32>,
-    /// Facts lost without the landmark at hand, itself included.
+    /// Facts that are unreachable without the landmark under test, itself included.
     lost: Vec<u32>,
     is_lost: Vec<bool>,
     work: usize,

@@ -13,7 +13,7 @@ use crate::ground::Earns;
 use crate::memory::MemoryLimit;
 use crate::technique::{Technique, Without};
 
-use super::advance::{Part, Situation, TemporalStep};
+use super::advance::{Situation, TemporalStep};
 use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
@@ -416,7 +416,7 @@ impl Run<'_, '_, '_> {
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
         let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();
-        let mut ordered = in_time_order(self.space, &steps);
+        let mut ordered = self.space.in_time_order(&steps);
         if let Some((again, _)) = self.space.replay_to_goal(&mut ordered, self.stop)?
             && again <= measured
         {
@@ -577,33 +577,4 @@ impl Run<'_, '_, '_> {
 /// times.
 fn tolerance(measured: f64) -> f64 {
     1e-6 * measured.abs().max(1.0)
-}
-
-/// Steps in order of their times, so that a prefix of them is what happens until some time. The order
-/// may be invalid as a sequence of compressed steps, because an action that starts early may end late.
-fn in_time_order(space: &Space, steps: &[TemporalStep]) -> Vec<TemporalStep> {
-    let Ok(track) = space.track(steps) else { return steps.to_vec() };
-    let mut starts: Vec<usize> = Vec::new();
-    let mut timed: Vec<(f64, &TemporalStep)> = Vec::with_capacity(steps.len());
-    let mut given = space.world.ground.timed.iter();
-    for (index, step) in steps.iter().enumerate() {
-        let own = track.actions[index];
-        let time_s = match step.part {
-            Part::Free => given.next().map_or(0.0, |timed| timed.time_s),
-            Part::Whole | Part::Start => {
-                starts.extend((step.part == Part::Start).then_some(index));
-                own.map_or(0.0, |(start, _)| track.order.earliest_s(start))
-            }
-            Part::End => {
-                let same =
-                    |&start: &usize| steps[start].act == step.act && steps[start].proposal == step.proposal;
-                let start = starts.iter().position(same).map(|position| starts.remove(position));
-                let end = start.and_then(|start| track.actions[start]).and_then(|(_, end)| end);
-                end.map_or(0.0, |end| track.order.earliest_s(end))
-            }
-        };
-        timed.push((time_s, step));
-    }
-    timed.sort_by(|one, other| one.0.total_cmp(&other.0));
-    timed.into_iter().map(|(_, step)| step.clone()).collect()
 }

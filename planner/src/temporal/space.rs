@@ -134,6 +134,36 @@ pub struct Space<'w, 'a> {
 }
 
 impl<'w, 'a> Space<'w, 'a> {
+    /// Steps in order of their times, so that a prefix of them is what happens until some time. The order
+    /// may be invalid as a sequence of compressed steps, because an action that starts early may end late.
+    pub(super) fn in_time_order(&self, steps: &[TemporalStep]) -> Vec<TemporalStep> {
+        let Ok(track) = self.track(steps) else { return steps.to_vec() };
+        let mut starts: Vec<usize> = Vec::new();
+        let mut timed: Vec<(f64, &TemporalStep)> = Vec::with_capacity(steps.len());
+        let mut given = self.world.ground.timed.iter();
+        for (index, step) in steps.iter().enumerate() {
+            let own = track.actions[index];
+            let time_s = match step.part {
+                Part::Free => given.next().map_or(0.0, |timed| timed.time_s),
+                Part::Whole | Part::Start => {
+                    starts.extend((step.part == Part::Start).then_some(index));
+                    own.map_or(0.0, |(start, _)| track.order.earliest_s(start))
+                }
+                Part::End => {
+                    let same = |&start: &usize| {
+                        steps[start].act == step.act && steps[start].proposal == step.proposal
+                    };
+                    let start = starts.iter().position(same).map(|position| starts.remove(position));
+                    let end = start.and_then(|start| track.actions[start]).and_then(|(_, end)| end);
+                    end.map_or(0.0, |end| track.order.earliest_s(end))
+                }
+            };
+            timed.push((time_s, step));
+        }
+        timed.sort_by(|one, other| one.0.total_cmp(&other.0));
+        timed.into_iter().map(|(_, step)| step.clone()).collect()
+    }
+
     /// Search space in which the actions marked in `open_act` have separate starts and ends.
     pub fn new(world: &'w World<'a>, open_act: Vec<bool>, measure: Measure) -> Space<'w, 'a> {
         let ground = world.ground;

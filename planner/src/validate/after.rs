@@ -32,8 +32,8 @@ pub fn after(
     Ok(names.iter().flat_map(|name| instances(task, &replayed.state, name)).collect())
 }
 
-/// Plan whose steps take the duration that their actions demand (`= ?duration`, at start) in the
-/// initial state, where defined.
+/// Plan in which each step has the duration that its action fixes by `(= ?duration …)`, evaluated in
+/// the initial state; a step keeps its own duration where that is undefined.
 fn timed(semantics: &Semantics<'_>, steps: &Plan) -> Plan {
     let Ok(state) = semantics.initial() else { return steps.clone() };
     let asked_s = |step: &Step| -> Option<f64> {

@@ -19,7 +19,7 @@ pub(crate) struct Replayed {
     pub state: State,
     /// States with the times at which they begin, in seconds; empty for a task without constraints.
     pub trace: Vec<(f64, State)>,
-    /// Number of violated action conditions of each preference.
+    /// For each preference in conditions of actions, how often steps violated it.
     pub violations: Vec<f64>,
     /// End of the plan: a time in seconds, or the number of steps for a plan without times.
     pub end: f64,

@@ -255,7 +255,7 @@ impl Known {
         self.states.get()
     }
 
-    /// Mutable access to the state of *shapes*.
+    /// Mutable access to the floor, the state of the ability *shapes*.
     pub(super) fn floor_mut(&mut self) -> &mut Floor {
         self.states.get_mut()
     }

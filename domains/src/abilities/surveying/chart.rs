@@ -249,7 +249,7 @@ impl Chart {
         })
     }
 
-    /// What is expected to be seen from the exploration pose with a symbol.
+    /// Expected view from the exploration pose with a symbol.
     pub(super) fn outlook(&self, symbol: &str) -> Option<&Outlook> {
         self.open.iter().find(|(name, _)| name == symbol).map(|(_, look)| look)
     }

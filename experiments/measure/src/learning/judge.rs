@@ -24,7 +24,7 @@ const LOOKS: [usize; 4] = [1, usize::MAX, 2, usize::MAX];
 /// Number of leaflets in every second scene: flat prints fit any model known from one side only.
 const LEAFLETS: usize = 4;
 
-/// Models as learned by the robot and by a turntable, alternately.
+/// Two models of each body, one after the other: learned from views of the robot, and from views on a turntable.
 fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
     let mut models = Vec::new();
     for (i, body) in bodies.iter().enumerate().take(KNOWN) {

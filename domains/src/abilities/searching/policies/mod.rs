@@ -128,8 +128,8 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
         .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
 }
 
-/// True if the next view is a policy's choice: something requested is still uncertain, or nothing is
-/// requested, and the hand is empty. Other steps are left to the planner.
+/// True if the next view is a policy's choice: the hand is empty, and either something requested is
+/// still uncertain or nothing is requested. Other steps are left to the planner.
 pub fn is_asked(s: &Situation) -> bool {
     let own: Vec<usize> = (0..s.things.len()).filter(|&n| s.things[n].track.is_none()).collect();
     let unsure = own.iter().any(|&n| s.confidence(n) < s.threshold)

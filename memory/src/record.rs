@@ -28,7 +28,7 @@ pub mod kind {
     pub const TRANSFORMS: &str = "transforms";
     /// A static transform.
     pub const STATIC_TRANSFORM: &str = "static_transform";
-    /// Kind of a document that holds a line of the log.
+    /// A line of the log.
     pub const LOG: &str = "log";
 }
 

@@ -45,16 +45,6 @@ pub enum SurfaceError {
         /// Evidence that the surface is the floor.
         because: Sign,
     },
-    /// A surface that is as wanted may be the floor as well as a table.
-    #[error(
-        "a level surface of {area_m2:.2} m² may be a table or the floor ({because}): look where its edge is in view, or give the height band that it is in"
-    )]
-    Untold {
-        /// Area of the surface, square metres.
-        area_m2: f64,
-        /// Evidence that leaves the role undecided.
-        because: Sign,
-    },
     /// None of the requested surfaces is a support.
     #[error("what is level here is nothing to stand things on ({because}): look at the table")]
     OnlyOther {

@@ -577,11 +577,8 @@ fn check_real_table(every: usize) {
         };
         let objects = said["objects"].as_array().expect("a list");
         let nearest = objects.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b))).expect("something");
-        let expected = if reference["name"].as_str().is_some_and(|n| n.contains("mug")) {
-            Value::from("mug")
-        } else {
-            Value::Null
-        };
+        let is_mug = reference["name"].as_str().is_some_and(|n| n.contains("mug"));
+        let expected = if is_mug { Value::from("mug") } else { Value::Null };
         assert_eq!(nearest["label"], expected, "{reference}: {nearest}");
         assert!(apart_m(&nearest) < 0.05, "{reference}: {nearest}");
     }

@@ -1,4 +1,4 @@
-//! What the hand holds, and what the arm reaches.
+//! Object in the hand, and reach of the arm.
 
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{Point3, Vector3};

@@ -26,7 +26,7 @@ pub struct Config {
     /// Default scene of the simulated robot.
     #[serde(default)]
     pub scene: String,
-    /// What may be said. Each phrase has a goal as its meaning.
+    /// Phrases that may be said, each with a goal as its meaning.
     #[serde(default)]
     pub goal: Vec<GoalPhrase>,
     /// Probabilities that count as sure.
@@ -45,7 +45,7 @@ pub struct Config {
     /// Limits of a run.
     #[serde(default)]
     pub limits: Limits,
-    /// How each action is carried out; an action without an entry is carried out by the skill with its
+    /// Execution of each action; an action without an entry is carried out by the skill with its
     /// name.
     #[serde(default)]
     pub action: BTreeMap<String, ActionConfig>,

@@ -22,7 +22,7 @@ pub struct Normals {
 
 /// Estimates normals from the `k` nearest points (itself included), towards `viewpoint` (metres, in the points' frame).
 ///
-/// Where fewer than three neighbours exist or all lie on a line, the normal is NaN.
+/// The normal is NaN where fewer than three neighbours exist or all lie on a line.
 pub fn estimate(tree: &Neighbours, k: usize, viewpoint: &Point3<f32>) -> Normals {
     let _span = tracing::debug_span!("normals", points = tree.len(), k).entered();
     let none = [f32::NAN; 4];

@@ -44,7 +44,7 @@ const STEP_M: f64 = 0.05;
 /// Positions on each line where the body fits, nearest to the object first, in line order.
 ///
 /// `obstacles`: observed points (world, z up, metres). A position is free if none of them is within the footprint.
-/// Whether it can be reached is left to the route planner, which may keep the body farther away from obstacles.
+/// Reachability is left to the route planner, which may keep the body farther away from obstacles.
 ///
 /// # Errors
 /// If an option is not positive, or there are more points than can be indexed.

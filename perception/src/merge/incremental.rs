@@ -1,6 +1,6 @@
 //! Incremental merge: a further view of the same place reuses the results of the earlier ones.
 //!
-//! What depends on one view alone is kept while the view is unchanged. A further view is aligned to
+//! Results that depend on one view alone are kept while the view is unchanged. A further view is aligned to
 //! the nearest earlier views, which stay fixed, and fused; only the voxels that it touches are
 //! settled again, and the frame stays the average of the localised poses. Few views hardly
 //! determine their poses relative to each other, so the next ones may move them; if they do, all

@@ -5,7 +5,7 @@ use super::model::ObjectModel;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-/// How an object rests on its support: upright, upside down, lying, or unknown.
+/// Side on which an object rests on its support: upright, upside down, lying, or unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stance {
@@ -95,7 +95,7 @@ pub struct Percept {
     pub position_sigma_m: f64,
     /// Longer and shorter side of the footprint, and height above the support, metres.
     pub size_m: [f64; 3],
-    /// How the object rests on its support.
+    /// Side on which the object rests.
     pub stance: Stance,
     /// Number of cloud points of the object.
     pub points: usize,

@@ -1,6 +1,6 @@
 //! Round objects lying on their side, measured like standing ones after rotation.
 //!
-//! Which end of a lying object is its foot is unknown, so that it is measured with either end down.
+//! A lying object is measured with either end down, because it is unknown which end is its foot.
 
 use super::asker::Asker;
 use super::body::Frustum;

@@ -44,7 +44,7 @@ impl Relation {
 
     /// True if two numbers satisfy the relation within the tolerance; false if one is NaN.
     ///
-    /// Of any two numbers exactly one of `<`, `=` and `>` holds.
+    /// Exactly one of `<`, `=` and `>` holds of any two numbers.
     pub fn holds(self, left: f64, right: f64) -> bool {
         match self {
             Relation::Less => left < right && !equal(left, right),

@@ -1,7 +1,7 @@
 //! Keeps apart happenings that interfere by the strict rule of PDDL 2.1 ("no moving targets"), where
 //! grounding hides the interference.
 //!
-//! By PDDL 2.1 (section 8.1), and in strict validators, a condition reads everything that it mentions,
+//! A condition reads everything that it mentions (PDDL 2.1, section 8.1, and strict validators),
 //! and nothing that it reads may change at the same time. Grounding drops parts of conditions that
 //! static facts decide, instances that cannot derive a derived fact, conditions that always hold, and
 //! effects that no condition needs. So the search does not see these reads and writes. This is no loss,

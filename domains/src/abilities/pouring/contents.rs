@@ -1,4 +1,4 @@
-//! What vessels are known to hold, in this run and from run to run.
+//! Contents of vessels as far as they are known, in this run and from run to run.
 
 use descry_memory::belief::{Belief, Track};
 use descry_memory::remember::{HALF_LIFE_S, Remembered, SAME_M};

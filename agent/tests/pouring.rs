@@ -19,7 +19,7 @@ fn runs(scene: &str, store: &Path, said: &[&str]) -> Vec<Lived> {
     said.iter().map(|said| run(said).unwrap_or_else(|e| panic!("{said}: {e}"))).collect()
 }
 
-/// What was poured or spilt, as the simulator knows it.
+/// Contents poured and spilt, as the simulator knows them.
 fn events(lived: &Lived) -> Vec<&str> {
     let said = lived.truth[1].events.iter().map(|event| event.what.as_str());
     said.filter(|what| what.contains("pour") || what.contains("spil")).collect()

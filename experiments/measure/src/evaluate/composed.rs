@@ -7,7 +7,7 @@ use descry_robots::sim::composed::{Composed, Piece};
 use descry_robots::sim::shape::{Cuboid, Cup, Cylinder, Shape};
 use descry_robots::sim::{SceneSpec, SimOptions};
 
-use super::room::{self, Answer, STRIDE};
+use super::room::{self, Answer, BESIDE, STRIDE};
 use super::searching::Search;
 
 /// Looks that a search may take; all poses of the ring but the start.
@@ -17,17 +17,11 @@ const LOOKS: usize = 8;
 const KINDS: [&str; 11] =
     ["alone", "saucer", "tin", "bowl", "tray", "book", "box", "in a tin", "stacked", "upside down", "bottle"];
 
-const OBJECTS: &str = r#"
+const ASKED: &str = r#"
 [[object]]
 name = "asked"
 shape.cup = { diameter_m = 0.16, height_m = 0.25 }
 area_m = [1.2, 0.5]
-[[object]]
-name = "carton"
-shape.box = { size_m = [0.10, 0.06, 0.20] }
-[[object]]
-name = "can"
-shape.cylinder = { diameter_m = 0.066, height_m = 0.12 }
 "#;
 
 fn cup(diameter_m: f64, base_m: Option<f64>, height_m: f64) -> Shape {
@@ -111,7 +105,7 @@ fn bottle() -> ObjectModel {
 pub fn run(count: u64, first: u64, only: &str) -> Result<(), String> {
     let mut domain = Domain::load("tabletop").map_err(|e| e.to_string())?;
     domain.objects.push(bottle());
-    let spec = room::spec("A thing on, in or under another", OBJECTS)?;
+    let spec = room::spec("A thing on, in or under another", &format!("{ASKED}{BESIDE}"))?;
     let runtime = room::runtime()?;
     println!(
         "{:>12} {:>7} {:>6} {:>11} {:>15} {:>9} | {:>7} {:>10} {:>11} {:>9} | {:>6} {:>9}",

@@ -21,7 +21,7 @@ use descry_robots::sim::shape::{Cup, Shape};
 use descry_robots::sim::{Scene, SimOptions, SimRobot};
 use descry_robots::{Pixels, Place, Pose2, Robot, Station, Watch};
 
-use super::room;
+use super::room::{self, BESIDE};
 use super::tabletop::Draws;
 
 /// Frames of a recording around the table.
@@ -29,17 +29,14 @@ const FRAMES: usize = 8;
 /// Distances farther out at which a frame is taken where the body cannot stand, metres.
 const OUTWARDS_M: [f64; 4] = [0.1, 0.2, 0.3, 0.4];
 
-const OBJECTS: &str = r#"
+const ASKED: &str = r#"
 [[object]]
 name = "asked"
 shape.cup = { diameter_m = 0.070, height_m = 0.104 }
 area_m = [1.2, 0.5]
-[[object]]
-name = "carton"
-shape.box = { size_m = [0.10, 0.06, 0.20] }
-[[object]]
-name = "can"
-shape.cylinder = { diameter_m = 0.066, height_m = 0.12 }
+"#;
+
+const MUG: &str = r#"
 [[object]]
 name = "mug"
 shape.mug = { diameter_m = 0.080, height_m = 0.095 }
@@ -260,7 +257,7 @@ pub struct AnswerCounts {
 /// requested object and without it in turn, from a seed.
 pub fn measured(count: usize, first: u64) -> Result<Vec<(&'static str, AnswerCounts)>, String> {
     let domain = Domain::load("tabletop").map_err(|e| e.to_string())?;
-    let spec = room::spec("A cup among others", OBJECTS)?;
+    let spec = room::spec("A cup among others", &format!("{ASKED}{BESIDE}{MUG}"))?;
     let runtime = room::runtime()?;
     let names = ROWS.iter().map(|(name, _)| *name).chain(["none"]);
     let mut tallies: Vec<(&'static str, AnswerCounts)> =

@@ -20,6 +20,16 @@ height_m = 0.72
 position_m = [-1.4, 0.0]
 "#;
 
+/// Tables of the two things that stand beside what is asked for.
+pub const BESIDE: &str = r#"
+[[object]]
+name = "carton"
+shape.box = { size_m = [0.10, 0.06, 0.20] }
+[[object]]
+name = "can"
+shape.cylinder = { diameter_m = 0.066, height_m = 0.12 }
+"#;
+
 /// Scene of the room with the given tables of TOML behind surface and start.
 pub fn spec(title: &str, rest: &str) -> Result<SceneSpec, String> {
     SceneSpec::parse(title, &format!("title = {title:?}\n{TABLE}{rest}")).map_err(|e| e.to_string())

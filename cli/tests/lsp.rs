@@ -347,9 +347,9 @@ fn words_keys_and_headings_are_told_in_texts_that_are_not_finished() {
     editor.open(&toml, &keys);
     for (sought, further, word) in [
         (action, 10, ":parameters"),
-        (action, 3, "How each action is carried out"),
+        (action, 3, "Execution of each action"),
         ("retries", 2, "tries again after a failure"),
-        ("[[goal]]", 4, "What may be said"),
+        ("[[goal]]", 4, "Phrases that may be said"),
     ] {
         let said = editor.hover(&toml, &keys, sought, further);
         assert!(said.contains(word), "{sought}: {said}");

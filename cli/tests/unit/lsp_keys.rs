@@ -15,9 +15,9 @@ fn headings_and_keys_mean_what_the_reference_says() {
         assert!(meaning.contains(words), "{sought}: {meaning}");
     };
     check("name =", 2, Some("name"), "The domain's name.");
-    check("[[goal]]", 3, Some("goal"), "What may be said.");
+    check("[[goal]]", 3, Some("goal"), "Phrases that may be said, each with a goal");
     check("say =", 0, Some("say"), "Words and `<slots>`");
-    check("[action.fly]", 2, Some("action"), "How each action is carried out");
+    check("[action.fly]", 2, Some("action"), "Execution of each action");
     check("[action.fly]", 9, Some("fly"), "");
     check("retries", 7, Some("retries"), "tries again after a failure");
     check("\"move ?from", 2, None, "");
